@@ -1,0 +1,1 @@
+"""rtcore: the ray tracer."""
