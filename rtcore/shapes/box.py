@@ -1,8 +1,15 @@
-"""Box: authoring record."""
+"""Box: the unit cube -1 .. 1 by slabs, placed by a matrix."""
 from typing import Annotated
 
+import numpy as np
+
+from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import FieldError, Vec, Vector
-from rtcore.scene import Shape
+from rtcore.jit import inline, kernel
+from rtcore.lanes import greatest, least, load, load3, select, splat3
+from rtcore.scene import Shape, invertible
+from rtcore.shapes.kind import CENTER, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.wave import DX, OX, START, record
 
 
 class Box(Shape, frozen=True):
@@ -14,3 +21,69 @@ class Box(Shape, frozen=True):
     def check(self):
         if not all(a < b for a, b in zip(self.low, self.high)):
             raise FieldError(f"three numbers each greater than those of low, {self.low}", self.high, "high")
+
+    def pack(self, matrix: np.ndarray) -> Packed:
+        low, high = np.array(self.low), np.array(self.high)
+        unit = np.diag([*(high - low) / 2, 1.0])
+        unit[:3, 3] = low / 2 + high / 2
+        local = matrix @ unit
+        return Packed(BOX, placed(local, invertible(local))[None])
+
+
+@inline
+def hit_cube(rays, i, p, o, d, side, opacity):
+    """Eight rays against the cube; a ray in the plane of a face (0·inf, a NaN) is left to the other slabs."""
+    ix, iy, iz = 1 / d.x, 1 / d.y, 1 / d.z
+    x0, x1, y0, y1, z0, z1 = (-1 - o.x) * ix, (1 - o.x) * ix, (-1 - o.y) * iy, (1 - o.y) * iy, (-1 - o.z) * iz, (1 - o.z) * iz
+    enter = greatest(least(z0, z1), greatest(least(y0, y1), greatest(least(x0, x1), -np.inf)))
+    leave = least(greatest(z0, z1), least(greatest(y0, y1), least(greatest(x0, x1), np.inf)))
+    if side == 0:
+        t = select(enter > load(rays.ray, START, i), enter, leave)
+    else:
+        t = enter if side & 1 else leave
+    record(rays, i, p, t, enter <= leave, opacity)
+
+
+@kernel
+def intersect(rays, n, tree, table, first, opacity):
+    walk = new_walk(rays)
+    for start in range(0, n, PACKET):
+        begin(walk, rays, start, n, tree)
+        node = next_leaf(walk, tree)
+        while node >= 0:
+            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                for g in range(PACKET // 8):
+                    if (walk.state[1] >> g) & 1:
+                        i = start + g * 8
+                        o = into(table.data, q, load3(rays.ray, OX, i) - splat3(table.data, q, CENTER))
+                        hit_cube(rays, i, first + q, o, into(table.data, q, load3(rays.ray, DX, i)), table.side[q], opacity)
+            shrink(walk, rays, start)
+            node = next_leaf(walk, tree)
+
+
+@kernel
+def surface(rays, n, out, table, first):
+    last = first + table.data.shape[0]
+    for i in range(n):
+        if first <= rays.prim[i] < last:
+            q = rays.prim[i] - first
+            x, y, z = unit_hit(rays, i, table.data, q)
+            nx, ny, nz = 0.0, 0.0, 0.0
+            # the face is the one whose plane the point is nearest to; the point is put onto it
+            if abs(x) >= max(abs(y), abs(z)):
+                nx = np.copysign(1.0, x)
+                x, u, v = nx, y, z
+            elif abs(y) >= abs(z):
+                ny = np.copysign(1.0, y)
+                y, u, v = ny, z, x
+            else:
+                nz = np.copysign(1.0, z)
+                z, u, v = nz, x, y
+            put_placed(out, i, table.data, q, x, y, z, nx, ny, nz, (u + 1) / 2, (v + 1) / 2)
+
+
+def _bounds(data, extra):
+    return placed_bounds(data, np.abs(forward(data)).sum(2))
+
+
+BOX = Kind("box", intersect, surface, _bounds, lambda: Box((-1, -1, -1), (1, 1, 1)).pack(np.eye(4)))

@@ -1,0 +1,91 @@
+"""Scene to arrays: every visible shape as primitives of its kind, the kinds' tables and trees, and what belongs to a primitive.
+
+Primitives are numbered through all kinds, kinds by name and, within one, in the order of its tree's leaves.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.bvh import EMPTY_TREE, Tree, build
+from rtcore.fields import FieldError
+from rtcore.scene import Leaf, Scene
+from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
+
+DTYPES = {"f32": np.float32, "f64": np.float64}
+
+
+class Group(NamedTuple):
+    """All primitives of one kind."""
+
+    kind: Kind
+    tree: Tree
+    table: Table
+    first: int          # number of the first one
+    has_tree: bool      # False: a handful in one box, or unbounded
+
+
+class Geometry(NamedTuple):
+    """A scene's shapes, ready for the kernels of one precision."""
+
+    groups: tuple[Group, ...]
+    leaf: np.ndarray            # int32 (primitives): which of scene.leaves() each belongs to
+    leaves: tuple[Leaf, ...]
+    dropped: int                # degenerate primitives left out
+    dtype: type
+    nbytes: int
+
+
+def flatten(scene: Scene, precision: str = "f64") -> Geometry:
+    """Arrays and trees for the visible shapes of a scene. Raises FieldError where a placed shape has no finite extent."""
+    dtype = DTYPES[precision]
+    leaves = tuple(scene.leaves())
+    packs: dict[Kind, list[tuple[int, Packed]]] = {}
+    for index, leaf in enumerate(leaves):
+        if leaf.visible:
+            try:
+                packed = leaf.shape.pack(leaf.matrix)
+            except FieldError as error:
+                raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
+            if not np.isfinite(packed.data).all() or not np.isfinite(packed.data.astype(dtype)).all():
+                raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
+            packs.setdefault(packed.kind, []).append((index, packed))
+    groups, owners, first = [], [np.zeros(0, np.int32)], 0
+    for kind in sorted(packs, key=lambda kind: kind.name):
+        group, owner = _gather(kind, packs[kind], leaves, first, dtype)
+        groups.append(group)
+        owners.append(owner)
+        first += len(owner)
+    nbytes = sum(a.nbytes for g in groups for a in (*g.tree, *g.table))
+    return Geometry(tuple(groups), np.concatenate(owners), leaves, sum(p.dropped for packed in packs.values() for _, p in packed), dtype, nbytes)
+
+
+def place(leaf: Leaf) -> str:
+    """Where a leaf stands, as error messages say it."""
+    return "scene" + "".join(f"[{i}]" for i in leaf.path)
+
+
+def _gather(kind: Kind, packs: list[tuple[int, Packed]], leaves, first: int, dtype) -> tuple[Group, np.ndarray]:
+    """One kind's group, and the leaf of each of its primitives."""
+    data = np.concatenate([p.data for _, p in packs])
+    lengths = [len(p.data) for _, p in packs]
+    owner = np.repeat(np.array([index for index, _ in packs], np.int32), lengths)
+    side = np.repeat(np.array([SIDES[leaves[index].shape.sides] + (MIRRORED if p.mirrored else 0) for index, p in packs], np.int8), lengths)
+    extra = np.zeros((0, 3 if kind.shared_extra else 9))
+    if kind.shared_extra:
+        extra = np.concatenate([p.extra for _, p in packs])
+        data[:, -2] = np.concatenate([[0], np.cumsum(data[:-1, -1])])
+    elif any(p.extra is not None for _, p in packs):
+        # a row of zeros says: flat
+        extra = np.concatenate([p.extra if p.extra is not None else np.zeros((len(p.data), 9)) for _, p in packs])
+    tree, has_tree = EMPTY_TREE, False
+    if kind.bounds is not None and len(data):
+        # bounds of the numbers that the kernel will see
+        rounded = data.astype(dtype).astype(np.float64), extra.astype(dtype).astype(np.float64)
+        low, high = kind.bounds(*rounded)
+        tree, order = build(low, high, kind.leaf_most)
+        has_tree = len(tree.box) > 1
+        data, owner, side = data[order], owner[order], side[order]
+        if len(extra) and not kind.shared_extra:
+            extra = extra[order]
+    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, dtype), side)
+    return Group(kind, tree, table, first, has_tree), owner

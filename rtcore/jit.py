@@ -1,0 +1,103 @@
+"""The one kernel decorator, and the folder where compiled kernels are kept.
+
+numba's on-disk cache notices an edit only in the file of the kernel itself, not in the files it calls into. So every module
+gets a cache folder named by a hash of its own source, of all rtcore sources it imports, and of the compiler and processor:
+a kernel can never be stale, and an edit to one shape recompiles that shape alone.
+
+No fast-math flags anywhere: sums are contracted where a kernel says `fma` and nowhere else, so that a formula has the same
+bits wherever it is inlined. That is what makes a picture independent of tiles, packets and threads.
+"""
+import functools
+import hashlib
+import os
+import re
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding
+import numba
+import numpy
+import platformdirs
+from numba import config, njit
+
+PACKAGE = Path(__file__).parent
+KEEP_DAYS = 30
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return os.access(folder, os.W_OK)
+    except OSError:
+        return False
+
+
+@functools.cache
+def cache_root() -> Path:
+    """Where compiled kernels are kept: $RAYSCOPE_CACHE, the user's cache folder, or a temporary one if that can't be written."""
+    wanted = Path(os.environ.get("RAYSCOPE_CACHE") or platformdirs.user_cache_path("rayscope", appauthor=False)) / "kernels"
+    return wanted if _writable(wanted) else Path(tempfile.mkdtemp(prefix="rayscope-kernels-"))
+
+
+@functools.cache
+def _source(module: str) -> Path | None:
+    if module.split(".")[0] != PACKAGE.name:
+        return Path(sys.modules[module].__file__)      # a kernel of a test or of a user's script
+    path = PACKAGE.parent.joinpath(*module.split("."))
+    return next((p for p in (path.with_suffix(".py"), path / "__init__.py") if p.is_file()), None)
+
+
+@functools.cache
+def _imports(module: str) -> frozenset[str]:
+    """The rtcore modules that a module's source imports, itself included."""
+    found = {module}
+    for package, names in re.findall(r"^\s*from (rtcore[\w.]*) import ([^\n]+)", _source(module).read_text("utf-8"), re.M):
+        found.add(package)
+        found.update(f"{package}.{name}" for name in re.findall(r"\w+", names))
+    return frozenset(name for name in found if _source(name))
+
+
+@functools.cache
+def fingerprint(module: str) -> str:
+    """A hash that changes whenever a kernel of the module might compile to something else."""
+    closure, todo = set(), {module}
+    while todo:
+        closure |= todo
+        todo = {name for m in todo for name in _imports(m)} - closure
+    digest = hashlib.sha256(repr((numba.__version__, llvmlite.__version__, numpy.__version__, sys.version_info[:2],
+                                  llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten())).encode())
+    for name in sorted(closure):
+        digest.update(name.encode() + _source(name).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder(module: str) -> Path:
+    """The cache folder of one module's kernels."""
+    return cache_root() / f"{module.removeprefix('rtcore.')}-{fingerprint(module)}"
+
+
+def prune() -> None:
+    """Remove kernel folders that nothing has used for a month."""
+    for folder in cache_root().iterdir():
+        try:
+            if time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
+                shutil.rmtree(folder, ignore_errors=True)
+        except OSError:
+            continue    # another process was quicker
+
+
+def kernel(function):
+    """Compile at the first call, keep the machine code on disk, release the GIL while running; division by zero is IEEE's."""
+    before, config.CACHE_DIR = config.CACHE_DIR, str(cache_folder(function.__module__))
+    try:
+        return njit(cache=True, nogil=True, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = before
+
+
+#: For the small functions that kernels are made of: always inlined, never cached on their own.
+inline = njit(nogil=True, error_model="numpy", forceinline=True)

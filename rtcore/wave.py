@@ -1,0 +1,62 @@
+"""A wave of rays as a structure of arrays, and the one function by which every shape's kernel reports a hit.
+
+Arrays are C-contiguous, a row a quantity, a column a ray; the number of columns is a multiple of 8 and columns past the last ray are
+dead (T = -inf). P is the precision of the render, float32 or float64.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.jit import inline
+from rtcore.lanes import LANES, add_where, any_lane, exceeds, load, select, store, store_where
+
+# rows of Rays.ray: origin, direction, the open interval (START, T) in which hits count; T becomes the nearest hit
+OX, OY, OZ, DX, DY, DZ, START, T = range(8)
+RAY_ROWS = 8
+DEAD = -np.inf
+
+# rows of Surface: hit point, geometric and shading normal (unit, on the front), bound on the point's error, texture coordinates
+PX, PY, PZ, GX, GY, GZ, NX, NY, NZ, ERR, U, V = range(12)
+SURFACE_ROWS = 12
+
+#: Optical depth of an opaque primitive, and what one unit of it is worth: light · exp(-depth·DEPTH_UNIT). Depths are integers, so
+#: that the order in which a shadow ray meets transparent things can't change a bit of the picture.
+OPAQUE = 1 << 24
+DEPTH_UNIT = 2.0 ** -16
+
+
+class Rays(NamedTuple):
+    """What the intersection kernels read and write."""
+
+    ray: np.ndarray     # P (8, n)
+    prim: np.ndarray    # int32 (n): the primitive hit, -1 none
+    depth: np.ndarray   # int32 (n): optical depth met so far; shadow waves only
+
+
+def padded(n: int) -> int:
+    """`n` rounded up to whole vectors."""
+    return -(-n // LANES) * LANES
+
+
+def new_rays(n: int, dtype) -> Rays:
+    """Rays for `n` rays, with nothing set."""
+    n = padded(n)
+    return Rays(np.empty((RAY_ROWS, n), dtype), np.empty(n, np.int32), np.empty(n, np.int32))
+
+
+@inline
+def record(rays, i, p, t, ok, opacity):
+    """Lanes i .. i+7 meet primitive p at t where ok. Without opacities the nearest hit is kept, and of equally near ones that of the
+    lower number, so that no order of the walk shows; with them (shadow rays) an opaque hit ends the ray, others add up."""
+    far = load(rays.ray, T, i)
+    ok = ok & (t > load(rays.ray, START, i)) & (t <= far)
+    if any_lane(ok):
+        ok = ok & ((t < far) | exceeds(rays.prim, i, p))
+        if opacity.shape[0] == 0:
+            store(rays.ray, T, i, select(ok, t, far))
+            store_where(rays.prim, i, ok, p)
+        elif opacity[p] == OPAQUE:
+            store(rays.ray, T, i, select(ok, DEAD, far))
+            store_where(rays.prim, i, ok, p)
+        else:
+            add_where(rays.depth, i, ok, opacity[p])
