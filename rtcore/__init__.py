@@ -1,1 +1,20 @@
-"""rtcore: the ray tracer."""
+"""rtcore: the ray tracer behind Rayscope.
+
+    scene = rtcore.load("scene.yaml")
+    image = rtcore.render(scene, size=(640, 480), spp=4)
+    hits = rtcore.intersect(scene, origins, directions)
+
+Shapes, lights and the parts of a scene are records to be made directly: `rtcore.Sphere((0, 0, 0), 1)`.
+"""
+from rtcore.api import Hits, Image, intersect, occluded, render
+from rtcore.camera import Camera
+from rtcore.fields import FieldError
+from rtcore.files import FileError, load, save
+from rtcore.lights import Ambient, Directional, Point
+from rtcore.scene import (Background, Checker, Fog, Material, Matrix, Node, Rotate, Scale, Scene, Shear, Translate)
+from rtcore.shapes import Box, Cone, Cylinder, Mesh, Plane, Polygon, Sphere, Triangle
+
+__all__ = ["Ambient", "Background", "Box", "Camera", "Checker", "Cone", "Cylinder", "Directional", "FieldError", "FileError", "Fog", "Hits",
+           "Image", "Material", "Matrix", "Mesh", "Node", "Plane", "Point", "Polygon", "Rotate", "Scale", "Scene", "Shear", "Sphere",
+           "Translate", "Triangle", "intersect", "load", "occluded", "render", "save"]
+__version__ = "0.1.0"

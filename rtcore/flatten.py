@@ -22,6 +22,9 @@ class Group(NamedTuple):
     table: Table
     first: int          # number of the first one
     has_tree: bool      # False: a handful in one box, or unbounded
+    key: tuple          # what it was made from: a group is made anew only when that has changed
+    owner: np.ndarray   # int32: the leaf of each of its primitives
+    dropped: int        # degenerate primitives left out
 
 
 class Geometry(NamedTuple):
@@ -35,28 +38,47 @@ class Geometry(NamedTuple):
     nbytes: int
 
 
-def flatten(scene: Scene, precision: str = "f64") -> Geometry:
-    """Arrays and trees for the visible shapes of a scene. Raises FieldError where a placed shape has no finite extent."""
+def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = None) -> Geometry:
+    """Arrays and trees for the visible shapes of a scene; kinds of which nothing has changed are taken over from `previous`.
+
+    Raises FieldError where a placed shape's numbers are not finite or its transforms together can't be inverted.
+    """
     dtype = DTYPES[precision]
     leaves = tuple(scene.leaves())
-    packs: dict[Kind, list[tuple[int, Packed]]] = {}
+    kinds: dict[Kind, list[int]] = {}
     for index, leaf in enumerate(leaves):
         if leaf.visible:
-            try:
-                packed = leaf.shape.pack(leaf.matrix)
-            except FieldError as error:
-                raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
-            if not np.isfinite(packed.data).all() or not np.isfinite(packed.data.astype(dtype)).all():
-                raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
-            packs.setdefault(packed.kind, []).append((index, packed))
-    groups, owners, first = [], [np.zeros(0, np.int32)], 0
-    for kind in sorted(packs, key=lambda kind: kind.name):
-        group, owner = _gather(kind, packs[kind], leaves, first, dtype)
-        groups.append(group)
-        owners.append(owner)
-        first += len(owner)
+            kinds.setdefault(leaf.shape.kind(leaf.matrix), []).append(index)
+    old = {g.kind: g for g in previous.groups} if previous is not None and previous.dtype == dtype else {}
+    groups, owners, first, dropped = [], [np.zeros(0, np.int32)], 0, 0
+    for kind in sorted(kinds, key=lambda kind: kind.name):
+        key = tuple((index, leaves[index].shape, leaves[index].matrix.tobytes()) for index in kinds[kind])
+        group = old.get(kind)
+        if group is None or not _same(group.key, key):
+            group = _gather(kind, key, [(index, _packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
+        groups.append(group._replace(first=first))
+        owners.append(group.owner)
+        first += len(group.owner)
+        dropped += group.dropped
     nbytes = sum(a.nbytes for g in groups for a in (*g.tree, *g.table))
-    return Geometry(tuple(groups), np.concatenate(owners), leaves, sum(p.dropped for packed in packs.values() for _, p in packed), dtype, nbytes)
+    return Geometry(tuple(groups), np.concatenate(owners), leaves, dropped, dtype, nbytes)
+
+
+def _same(a: tuple, b: tuple) -> bool:
+    """Whether two group keys name the very same shapes in the same places."""
+    return len(a) == len(b) and all(x[0] == y[0] and x[1] is y[1] and x[2] == y[2] for x, y in zip(a, b))
+
+
+def _packed(leaf: Leaf, dtype) -> Packed:
+    """A leaf's primitives, checked to be finite in the precision of the render."""
+    try:
+        packed = leaf.shape.pack(leaf.matrix)
+    except FieldError as error:
+        raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
+    with np.errstate(over="ignore"):
+        if not np.isfinite(packed.data.astype(dtype)).all():
+            raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
+    return packed
 
 
 def place(leaf: Leaf) -> str:
@@ -64,8 +86,8 @@ def place(leaf: Leaf) -> str:
     return "scene" + "".join(f"[{i}]" for i in leaf.path)
 
 
-def _gather(kind: Kind, packs: list[tuple[int, Packed]], leaves, first: int, dtype) -> tuple[Group, np.ndarray]:
-    """One kind's group, and the leaf of each of its primitives."""
+def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dtype) -> Group:
+    """One kind's group, its first primitive numbered 0."""
     data = np.concatenate([p.data for _, p in packs])
     lengths = [len(p.data) for _, p in packs]
     owner = np.repeat(np.array([index for index, _ in packs], np.int32), lengths)
@@ -88,4 +110,4 @@ def _gather(kind: Kind, packs: list[tuple[int, Packed]], leaves, first: int, dty
         if len(extra) and not kind.shared_extra:
             extra = extra[order]
     table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, dtype), side)
-    return Group(kind, tree, table, first, has_tree), owner
+    return Group(kind, tree, table, 0, has_tree, key, owner, sum(p.dropped for _, p in packs))

@@ -22,6 +22,10 @@ class Shape(Record, frozen=True, kw_only=True):
 
     sides: Annotated[str, Choice(words=("both", "front", "back"), help="which sides are visible; the front is where the normal points")] = "both"
 
+    def count(self) -> int:
+        """How many primitives the shape becomes."""
+        return 1
+
 
 class Light(Record, frozen=True, kw_only=True):
     """What every light has besides its own fields. Its module in `rtcore.lights` holds the rest."""

@@ -60,3 +60,58 @@ def record(rays, i, p, t, ok, opacity):
             store_where(rays.prim, i, ok, p)
         else:
             add_where(rays.depth, i, ok, opacity[p])
+
+
+class Wave(NamedTuple):
+    """Rays with what they carry and what is found where they hit. n columns, as many as `rays` has."""
+
+    rays: Rays
+    surface: np.ndarray     # P (12, n), rows as named above; only columns that hit something
+    light: np.ndarray       # float32 (3, n): radiance that comes along the ray
+    weight: np.ndarray      # float32 (3, n): how much of it the pixel gets
+    fade: np.ndarray        # float32 (n): what fog lets through
+    owner: np.ndarray       # int32 (n): the column of the primary ray it descends from
+
+
+class Beam(NamedTuple):
+    """Rays from hit points toward one light, with what they would bring if nothing were in the way."""
+
+    rays: Rays
+    aim: np.ndarray         # P (5, n), a column a ray of the lit wave: way to the light, t of the light, strength
+    bring: np.ndarray       # float32 (3, n), a column a shadow ray
+    owner: np.ndarray       # int32 (n): the column of the lit wave
+
+
+AIM_REACH, AIM_STRENGTH = 3, 4
+
+
+def new_wave(n: int, dtype) -> Wave:
+    """A wave for `n` rays, with nothing set."""
+    rays = new_rays(n, dtype)
+    n = rays.ray.shape[1]
+    return Wave(rays, np.empty((SURFACE_ROWS, n), dtype), np.empty((3, n), np.float32), np.empty((3, n), np.float32),
+                np.empty(n, np.float32), np.empty(n, np.int32))
+
+
+def new_beam(n: int, dtype) -> Beam:
+    """A beam for `n` rays, with nothing set."""
+    rays = new_rays(n, dtype)
+    n = rays.ray.shape[1]
+    return Beam(rays, np.empty((5, n), dtype), np.empty((3, n), np.float32), np.empty(n, np.int32))
+
+
+@inline
+def put_ray(rays, i, x, y, z, dx, dy, dz, far):
+    """Ray i: from (x, y, z) along (dx, dy, dz), hits counting from 0 to `far`."""
+    ray = rays.ray
+    ray[OX, i], ray[OY, i], ray[OZ, i] = x, y, z
+    ray[DX, i], ray[DY, i], ray[DZ, i] = dx, dy, dz
+    ray[START, i], ray[T, i] = 0.0, far
+    rays.prim[i], rays.depth[i] = -1, 0
+
+
+@inline
+def finish(rays, n):
+    """Let the columns after the last of n rays, up to a whole vector, be dead."""
+    for i in range(n, (n + LANES - 1) // LANES * LANES):
+        put_ray(rays, i, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, DEAD)

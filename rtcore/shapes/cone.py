@@ -12,7 +12,7 @@ from rtcore.fields import FieldError, Flag, Number, Vec, Vector
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, least, load, load3, root, select, splat3, vec3, with_sign
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import BACK, CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
 
 BASE, SLOPE, CAPPED = OWN, OWN + 1, OWN + 2
@@ -29,6 +29,9 @@ class Cylinder(Shape, frozen=True):
     def check(self):
         if self.base == self.apex:
             raise FieldError("a point other than base", self.apex, "apex")
+
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return CONE
 
     def pack(self, matrix: np.ndarray) -> Packed:
         return frustum(self.base, self.radius, self.apex, self.radius, self.capped, matrix)
@@ -48,6 +51,9 @@ class Cone(Shape, frozen=True):
             raise FieldError("a point other than base", self.apex, "apex")
         if self.base_radius == 0 and self.apex_radius == 0:
             raise FieldError("at least one radius greater than 0", 0, "base_radius")
+
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return CONE
 
     def pack(self, matrix: np.ndarray) -> Packed:
         return frustum(self.base, self.base_radius, self.apex, self.apex_radius, self.capped, matrix)
@@ -154,4 +160,4 @@ def _bounds(data, extra):
     return (np.minimum(discs[0] - halves[0], discs[1] - halves[1]) - pad, np.maximum(discs[0] + halves[0], discs[1] + halves[1]) + pad)
 
 
-CONE = Kind("cone", intersect, surface, _bounds, lambda: Cone((0, 0, 0), 1, (0, 0, 1)).pack(np.eye(4)))
+CONE = Kind("cone", intersect, surface, _bounds, (Cone((0, 0, 0), 1, (0, 0, 1)), ()))

@@ -16,6 +16,7 @@ import numpy as np
 
 from rtcore.jit import inline
 from rtcore.lanes import splat3, vec3
+from rtcore.scene import Shape
 from rtcore.wave import DX, ERR, GX, GY, GZ, NX, NY, NZ, OX, PX, PY, PZ, T, U, V
 
 FRONT, BACK, MIRRORED = 1, 2, 4     # Table.side: 0 both sides are visible; MIRRORED is added where a transform turned the winding around
@@ -48,7 +49,7 @@ class Kind:
     intersect: Callable
     surface: Callable
     bounds: Callable | None
-    example: Callable                   # () -> Packed: something small to compile the kernels with
+    example: tuple[Shape, tuple]        # a shape and transforms that become this kind, to compile the kernels with
     leaf_most: int = 4
     shared_extra: bool = False          # extra is no row per primitive: data's last two columns are its first row and its length
 

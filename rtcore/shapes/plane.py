@@ -17,6 +17,9 @@ class Plane(Shape, frozen=True):
     point: Annotated[Vec, Vector(help="any point of it", unit="scene units")]
     normal: Annotated[Vec, Vector(nonzero=True, help="at right angles to it, on its front; of any length")]
 
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return PLANE
+
     def pack(self, matrix: np.ndarray) -> Packed:
         normal = invertible(matrix)[:3, :3].T @ (np.array(self.normal) / np.abs(self.normal).max())
         normal /= np.abs(normal).max()
@@ -54,4 +57,4 @@ def surface(rays, n, out, table, first):
             put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))))
 
 
-PLANE = Kind("plane", intersect, surface, None, lambda: Plane((0, 0, 0), (0, 1, 0)).pack(np.eye(4)))
+PLANE = Kind("plane", intersect, surface, None, (Plane((0, 0, 0), (0, 1, 0)), ()))

@@ -31,6 +31,9 @@ class Polygon(Shape, frozen=True):
         if abs(heights[worst]) > 1e-3:
             raise FieldError("a corner in the plane of the others", self.vertices[worst], f"vertices[{worst}]")
 
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return POLYGON
+
     def pack(self, matrix: np.ndarray) -> Packed:
         points = np.array(self.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
         normal = newell(points)
@@ -118,4 +121,4 @@ def _bounds(data, extra):
     return low - pad, high + pad
 
 
-POLYGON = Kind("polygon", intersect, surface, _bounds, lambda: Polygon(((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))).pack(np.eye(4)), shared_extra=True)
+POLYGON = Kind("polygon", intersect, surface, _bounds, (Polygon(((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))), ()), shared_extra=True)

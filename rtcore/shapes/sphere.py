@@ -11,7 +11,7 @@ from rtcore.fields import Number, Vec, Vector
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, load, load3, root, select, splat3, with_sign
-from rtcore.scene import Shape, invertible
+from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes.kind import (CENTER, Kind, Packed, forward, into, normalized, placed, placed_bounds, put_placed, put_surface,
                                 similarity, unit_hit)
 from rtcore.wave import DX, OX, START, T, record
@@ -22,6 +22,9 @@ class Sphere(Shape, frozen=True):
 
     center: Annotated[Vec, Vector(help="the middle", unit="scene units")]
     radius: Annotated[float, Number(above=0, help="distance of the surface from the centre", unit="scene units")]
+
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return ELLIPSOID if similarity(matrix) is None else SPHERE
 
     def pack(self, matrix: np.ndarray) -> Packed:
         scale = similarity(matrix)
@@ -127,5 +130,5 @@ def _bounds_ellipsoid(data, extra):
     return placed_bounds(data, np.sqrt((forward(data) ** 2).sum(2)))
 
 
-SPHERE = Kind("sphere", intersect, surface, _bounds, lambda: Sphere((0, 0, 0), 1).pack(np.eye(4)))
-ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, lambda: Sphere((0, 0, 0), 1).pack(np.diag([1.0, 2, 3, 1])))
+SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()))
+ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, (Sphere((0, 0, 0), 1), (Scale((1, 2, 3)),)))

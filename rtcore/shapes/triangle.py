@@ -28,6 +28,9 @@ class Triangle(Shape, frozen=True):
         if self.normals is not None and len(self.normals) != 3:
             raise FieldError("three normals", self.normals, "normals")
 
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return TRIANGLE
+
     def pack(self, matrix: np.ndarray) -> Packed:
         return pack_triangles(np.array([[self.a, self.b, self.c]]), None if self.normals is None else np.array([self.normals]), matrix)
 
@@ -83,8 +86,14 @@ class Mesh(Shape, frozen=True, eq=False):
         if self.normals is not None and len(self.normals) != len(self.vertices):
             raise FieldError(f"as many normals as vertices, {len(self.vertices)}", len(self.normals), "normals")
 
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return TRIANGLE
+
     def pack(self, matrix: np.ndarray) -> Packed:
         return pack_triangles(self.vertices[self.faces], None if self.normals is None else self.normals[self.faces], matrix)
+
+    def count(self) -> int:
+        return len(self.faces)
 
     def __eq__(self, other):
         return (isinstance(other, Mesh) and self.sides == other.sides and self.file == other.file
@@ -224,4 +233,4 @@ def _bounds(data, extra):
     return low - pad, high + pad
 
 
-TRIANGLE = Kind("triangle", intersect, surface, _bounds, lambda: Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)).pack(np.eye(4)))
+TRIANGLE = Kind("triangle", intersect, surface, _bounds, (Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), ()))

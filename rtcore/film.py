@@ -1,0 +1,133 @@
+"""The film: sums of samples, so that films of different samples merge in any order, and what the first rays hit."""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.jit import kernel
+from rtcore.wave import NX, T
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)    # of linear sRGB (Rec. 709)
+
+
+class Film(NamedTuple):
+    """One picture of h·w pixels, rows from the top."""
+
+    total: np.ndarray       # float64 (h·w, 3): sum of the samples
+    square: np.ndarray      # float64 (h·w): sum of their squared luminance
+    count: np.ndarray       # int32 (h·w): how many
+    node: np.ndarray        # int32 (h·w): the leaf that sample 0 hit first, -1 none
+    distance: np.ndarray    # float32 (h·w): how far away, inf none
+    normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
+
+
+def new_film(width: int, height: int) -> Film:
+    """An empty film."""
+    n = width * height
+    return Film(np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int32), np.full(n, -1, np.int32), np.full(n, np.inf, np.float32), np.zeros((n, 3), np.float32))
+
+
+@kernel
+def note_first_hits(film, wave, n, target, leaf):
+    """Which leaf each primary ray hit, how far away, and the normal there."""
+    for i in range(n):
+        prim, p = wave.rays.prim[i], target[i]
+        film.node[p] = leaf[prim] if prim >= 0 else -1
+        film.distance[p] = wave.rays.ray[T, i]
+        for k in range(3):
+            film.normal[p, k] = wave.surface[NX + k, i] if prim >= 0 else 0
+
+
+@kernel
+def deposit(wave, n, sample):
+    """Add the wave's light to the primary rays it descends from; sample (3, primary rays)."""
+    for i in range(n):
+        for k in range(3):
+            sample[k, wave.owner[i]] += wave.weight[k, i] * wave.light[k, i]
+
+
+@kernel
+def commit(film, sample, n, target):
+    """Add one finished sample per target pixel; returns how many were not finite (they count as black)."""
+    bad = 0
+    for i in range(n):
+        p = target[i]
+        r, g, b = np.float64(sample[0, i]), np.float64(sample[1, i]), np.float64(sample[2, i])
+        if not np.isfinite(r + g + b):
+            bad += 1
+            r = g = b = 0.0
+        film.total[p, 0] += r
+        film.total[p, 1] += g
+        film.total[p, 2] += b
+        y = LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
+        film.square[p] += y * y
+        film.count[p] += 1
+    return bad
+
+
+@kernel
+def develop(film, width, height, spacing, pixels):
+    """The mean picture, pixels (h, w, 3) float32; a pixel without a sample shows that of the lattice before it."""
+    for y in range(height):
+        for x in range(width):
+            p, step = y * width + x, 1
+            while film.count[p] == 0 and step < spacing:
+                step *= 2
+                p = y // step * step * width + x // step * step
+            c = max(film.count[p], 1)
+            for k in range(3):
+                pixels[y, x, k] = film.total[p, k] / c
+
+
+@kernel
+def fill(film, width, height, spacing, node, distance, normal):
+    """First hits over the whole picture, (h, w), (h, w) and (h, w, 3), as `develop` fills it."""
+    for y in range(height):
+        for x in range(width):
+            p, step = y * width + x, 1
+            while film.count[p] == 0 and step < spacing:
+                step *= 2
+                p = y // step * step * width + x // step * step
+            node[y, x] = film.node[p]
+            distance[y, x] = film.distance[p]
+            for k in range(3):
+                normal[y, x, k] = film.normal[p, k]
+
+
+def rmse_estimate(film: Film) -> float | None:
+    """Root mean square error of the mean picture's luminance as the samples' own spread tells it; None below two samples."""
+    n = film.count[film.count > 1].astype(np.float64)
+    if len(n) == 0:
+        return None
+    y = film.total[film.count > 1] @ np.array(LUMINANCE)
+    variance = np.maximum(film.square[film.count > 1] - y * y / n, 0) / (n - 1)
+    return float(np.sqrt((variance / n).mean()))
+
+
+def _curve() -> np.ndarray:
+    """sRGB's curve as a table over 0 .. 1 in 4096 steps, fine enough that no 8-bit value is off by more than rounding at a step's edge."""
+    x = (np.arange(4097)) / 4096
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055) * 255 + 0.5
+
+
+CURVE = _curve().astype(np.float32)
+
+
+@kernel
+def _encode(pixels, out, exposure, curve):
+    height, width = pixels.shape[0], pixels.shape[1]
+    for y in range(height):
+        for x in range(width):
+            for k in range(3):
+                v = pixels[y, x, k] * exposure
+                v = v if v > 0 else np.float32(0)       # a NaN shows black
+                v = np.float32(4096) * (v if v < 1 else np.float32(1))
+                i = min(int(v), 4095)
+                out[y, x, 2 - k] = int(curve[i] + (curve[i + 1] - curve[i]) * (v - np.float32(i)))
+            out[y, x, 3] = 255
+
+
+def encode(pixels: np.ndarray, out: np.ndarray | None = None, exposure: float = 1.0) -> np.ndarray:
+    """Linear (h, w, 3) float32 as sRGB bytes (h, w, 4): blue, green, red, 255, the order of Qt's Format_RGB32."""
+    out = np.empty((*pixels.shape[:2], 4), np.uint8) if out is None else out
+    _encode(pixels, out, np.float32(exposure), CURVE)
+    return out

@@ -1,0 +1,92 @@
+"""Which stages a scene under its settings needs, which are left out, and why. The tracer runs exactly what the plan says."""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.lights import AIMS, STUDIO, Ambient
+from rtcore.scene import Leaf, Light, Scene
+from rtcore.settings import Settings
+from rtcore.shapes import KINDS
+from rtcore.shapes.kind import Kind
+from rtcore.views import VIEWS
+
+VIEW = {view.name: view for view in VIEWS}
+NO_LIGHT = "the view shows first hits only"
+
+
+class Plan(NamedTuple):
+    """Stages in the order they run, what was left out as (stage, why), and the kernels needed, named as `rtcore.warm` names them."""
+
+    stages: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
+    kernels: tuple[str, ...]
+    kinds: tuple[Kind, ...]         # kinds of primitives present, by name
+    lights: tuple[Light, ...]       # lights that cast light from somewhere
+    ambient: np.ndarray             # (3,) the sum of those that are everywhere
+    shadows: bool
+    bounces: bool
+    fog: bool
+    samples: int                    # per pixel
+
+
+def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = None) -> Plan:
+    """The plan for a scene; `leaves` saves a second walk over it."""
+    visible = [leaf for leaf in (scene.leaves() if leaves is None else leaves) if leaf.visible]
+    counts: dict[Kind, int] = {}
+    for leaf in visible:
+        kind = leaf.shape.kind(leaf.matrix)
+        counts[kind] = counts.get(kind, 0) + leaf.shape.count()
+    materials = {id(leaf.material): leaf.material for leaf in visible}.values()
+    stages, out = ["primary rays"], []
+    for kind in sorted(KINDS, key=lambda k: k.name):
+        if kind not in counts:
+            out.append((f"hits: {kind.name}", f"no visible {kind.name} in the scene"))
+            continue
+        stages.append(f"hits: {kind.name}")
+        if kind.bounds is None:
+            out.append((f"tree: {kind.name}", "they are unbounded"))
+        elif counts[kind] <= kind.leaf_most:
+            out.append((f"tree: {kind.name}", f"only {counts[kind]}: each is tested"))
+        else:
+            stages.append(f"tree: {kind.name}")
+    if counts:
+        stages.append("surface at the hits")
+
+    given = STUDIO if scene.lights is None else scene.lights
+    shining = [light for light in given if light.on and light.intensity > 0 and any(light.color)]
+    ambient = np.sum([np.multiply(l.color, l.intensity) for l in shining if isinstance(l, Ambient)] or [np.zeros(3)], axis=0)
+    answers = any(m.diffuse > 0 or m.specular > 0 for m in materials)
+    lights = tuple(light for light in shining if not isinstance(light, Ambient)) if answers else ()
+    lit = VIEW[settings.view].needs_light
+    lights = lights if lit else ()
+    if lights:
+        stages += sorted({f"light: {type(light).__name__.lower()}" for light in lights})
+    else:
+        why = "none shines from a place or direction" if answers or not materials else "no visible material answers light"
+        out.append(("lights", why if lit else NO_LIGHT))
+    shadows = _keep(stages, out, "shadow rays", [(lit, NO_LIGHT), (settings.shadows, "switched off"), (lights, "no light to cast them")])
+    _keep(stages, out, "smooth normals", [(any(getattr(leaf.shape, "normals", None) is not None for leaf in visible), "every surface has its own")])
+    _keep(stages, out, "patterns", [(any(m.checker for m in materials), "no visible material has one")])
+    fog = _keep(stages, out, "fog", [(lit, NO_LIGHT), (scene.fog is not None, "the scene has none"), (scene.fog is not None and scene.fog.on and settings.fog, "switched off")])
+    bounces = _keep(stages, out, "reflected and refracted rays", [
+        (lit, NO_LIGHT), (settings.reflections, "switched off"), (settings.max_depth > 1, "the depth is 1: eye rays only"),
+        (any(m.reflection > 0 or m.transmission > 0 for m in materials), "no visible material reflects or transmits")])
+    _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1 or settings.seconds or settings.error, "one sample per pixel was asked for")])
+    stages.append("film")
+    kinds = tuple(sorted(counts, key=lambda k: k.name))
+    names = ["core", *(["tree"] if any(s.startswith("tree") for s in stages) else []), *(k.name for k in kinds),
+             *(f"light-{word}" for word in sorted({type(l).__name__.lower() for l in lights})), *(["lit"] if lights else []),
+             *(["fog"] if fog else []), *(["bounce"] if bounces else [])]
+    assert all(type(light) in AIMS for light in lights)
+    return Plan(tuple(stages), tuple(out), tuple(f"{name}.{settings.precision}" for name in names), kinds, lights, ambient, shadows, bounces, fog,
+                settings.samples if lit else 1)
+
+
+def _keep(stages: list, out: list, stage: str, needs: list) -> bool:
+    """Keep a stage if every (condition, why not) holds; note it on the right list."""
+    why = next((why for holds, why in needs if not holds), None)
+    if why is None:
+        stages.append(stage)
+    else:
+        out.append((stage, why))
+    return why is None

@@ -1,0 +1,49 @@
+"""How a scene is to be rendered: what belongs to the render and not to the scene."""
+from typing import Annotated
+
+from rtcore.fields import Choice, Field, FieldError, Flag, Maybe, Number, Record
+from rtcore.views import VIEWS
+
+VIEW_NAMES = tuple(view.name for view in VIEWS)
+
+
+class Whole(Field):
+    """A whole number between two limits."""
+
+    def __init__(self, least: int, most: int, help: str):
+        super().__init__(help=help)
+        object.__setattr__(self, "least", least)
+        object.__setattr__(self, "most", most)
+
+    def take(self, value):
+        if isinstance(value, bool) or not isinstance(value, int) or not self.least <= value <= self.most:
+            raise FieldError(f"a whole number from {self.least} to {self.most}", value)
+        return value
+
+
+class Size(Field):
+    """Width and height of a picture."""
+
+    def take(self, value):
+        try:
+            w, h = value
+            return Whole(1, 16384, "").take(w), Whole(1, 16384, "").take(h)
+        except (TypeError, ValueError):
+            raise FieldError("a width and a height from 1 to 16384", value) from None
+
+
+class Settings(Record, frozen=True, kw_only=True):
+    """Settings of one render."""
+
+    size: Annotated[tuple[int, int], Size(help="width and height in pixels")] = (640, 480)
+    samples: Annotated[int, Whole(1, 1 << 20, "samples per pixel")] = 16
+    seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after this time")] = None
+    error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop at this estimated root mean square error")] = None
+    precision: Annotated[str, Choice(words=("f64", "f32"), help="of the geometry")] = "f64"
+    threads: Annotated[int, Whole(0, 1024, "render threads; 0: one per core")] = 0
+    max_depth: Annotated[int, Whole(1, 64, "longest chain of rays, the eye's included")] = 5
+    shadows: Annotated[bool, Flag(help="trace shadow rays")] = True
+    fog: Annotated[bool, Flag(help="let the scene's fog be seen")] = True
+    reflections: Annotated[bool, Flag(help="follow reflected and refracted rays")] = True
+    view: Annotated[str, Choice(words=VIEW_NAMES, help="what the picture shows")] = "beauty"
+    seed: Annotated[int, Whole(0, 2**31 - 1, "start of the samples' scatter")] = 0

@@ -1,0 +1,131 @@
+"""The way of a wave: from the eye through hits, light, fog and bounces to the film. Stages that the plan left out do not occur."""
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore import film as films, fog as fogs, shading
+from rtcore.eye import cast
+from rtcore.flatten import Geometry
+from rtcore.lights import AIMS
+from rtcore.plan import VIEW, Plan
+from rtcore.scene import Background, Fog
+from rtcore.settings import Settings
+from rtcore.wave import Wave, new_beam, new_wave
+
+CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
+
+#: Columns of Scratch.counts.
+COUNTS = ("reflection", "refraction", "primary", "primary_hits", "shadow", "shadow_hits", "nonfinite")
+REFLECTION, REFRACTION, PRIMARY, PRIMARY_HITS, SHADOW, SHADOW_HITS, NONFINITE = range(len(COUNTS))
+
+
+class Lamp(NamedTuple):
+    """A light, ready for its kernel."""
+
+    aim: Callable
+    numbers: np.ndarray
+    color: np.ndarray
+
+
+class Scratch:
+    """One thread's arrays, reused from tile to tile, and its counts."""
+
+    def __init__(self, dtype):
+        self.dtype = dtype
+        self.counts = np.zeros(len(COUNTS), np.int64)
+        self.waves: list[Wave] = []
+        self.beam = new_beam(0, dtype)
+        self.target = np.zeros(0, np.int32)
+        self.sample = np.zeros((3, 0), np.float32)
+
+    def wave(self, level: int, n: int) -> Wave:
+        """The wave of a bounce, with room for n rays."""
+        while len(self.waves) <= level:
+            self.waves.append(new_wave(0, self.dtype))
+        if self.waves[level].owner.shape[0] < n:
+            self.waves[level] = new_wave(n * 5 // 4, self.dtype)
+        return self.waves[level]
+
+    def primary(self, n: int) -> Wave:
+        """The first wave, its pixels and its sample, with room for n rays."""
+        if len(self.target) < n:
+            self.target, self.sample = np.empty(n, np.int32), np.empty((3, n), np.float32)
+        return self.wave(0, n)
+
+    def beams(self, n: int):
+        """A beam with room for n shadow rays."""
+        if self.beam.owner.shape[0] < n:
+            self.beam = new_beam(n * 5 // 4, self.dtype)
+        return self.beam
+
+
+class Tracer:
+    """Traces tiles of one scene from one camera. Holds nothing that changes, so threads may share it."""
+
+    def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, up, background: Background, fog: Fog | None):
+        self.geometry, self.plan, self.settings, self.view = geometry, plan, settings, view
+        self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
+        self.lamps = [Lamp(AIMS[type(light)], light.numbers(), np.multiply(light.color, light.intensity)) for light in plan.lights]
+        self.fog = fogs.numbers(fog) if plan.fog else None
+
+    def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
+        """Trace one sample of a tile (see `eye.cast`) onto the film; False if it was given up half way, the film then as before."""
+        room = int(tile[2] * tile[3])
+        wave = scratch.primary(room)
+        n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
+        if n == 0:
+            return True
+        counts = np.zeros_like(scratch.counts)
+        scratch.sample[:, :n] = 0
+        self.hit(wave, n)
+        counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
+        if sample == 0:
+            films.note_first_hits(film, wave, n, scratch.target, self.geometry.leaf)
+        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale):
+            return False
+        counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
+        scratch.counts += counts
+        return True
+
+    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale) -> bool:
+        """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
+        for depth in range(1, self.settings.max_depth + 1):
+            if depth > 1:
+                self.hit(wave, n)
+            self._light(scratch, wave, n, counts)
+            if self.fog is not None:
+                fogs.dim(wave, n, self.fog)
+            films.deposit(wave, n, scratch.sample)
+            if stale():
+                return False
+            if not self.plan.bounces or depth == self.settings.max_depth:
+                return True
+            child = scratch.wave(depth, 2 * n)
+            n, wave = shading.bounce(wave, n, self.look, child, counts), child
+            if n == 0:
+                return True
+        return True
+
+    def hit(self, wave: Wave, n: int) -> None:
+        """Nearest hits and their surfaces."""
+        for group in self.geometry.groups:
+            group.kind.intersect(wave.rays, n, group.tree, group.table, group.first, CLOSEST)
+        for group in self.geometry.groups:
+            group.kind.surface(wave.rays, n, wave.surface, group.table, group.first)
+
+    def _light(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray) -> None:
+        shading.glow(wave, n, self.look)
+        if not self.lamps:
+            return
+        beam = scratch.beams(n)
+        for lamp in self.lamps:
+            lamp.aim(wave, n, lamp.numbers, beam.aim)
+            m = shading.light_up(wave, n, self.look, lamp.color, beam)
+            if m == 0:
+                continue
+            if self.plan.shadows:
+                for group in self.geometry.groups:
+                    group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
+                counts[SHADOW] += m
+            counts[SHADOW_HITS] += shading.gather(wave, beam, m)

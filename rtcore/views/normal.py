@@ -1,0 +1,13 @@
+"""Normals as colours: x red, y green, z blue, -1 .. 1 as 0 .. 1 on the screen."""
+import numpy as np
+
+from rtcore.views.view import View
+
+
+def draw(pixels, node, distance, normal):
+    shown = (0.5 + 0.5 * normal) ** np.float32(2.2)
+    shown[node < 0] = 0
+    return shown.astype(np.float32)
+
+
+NORMAL = View("normal", "the surface's normal, x y z as red green blue", draw)

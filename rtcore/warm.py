@@ -1,0 +1,135 @@
+"""Compile kernels ahead of time into the cache, and know which are there.
+
+A kernel group is named by what it does and the precision, "sphere.f64", "core.f32". `python -m rtcore.warm NAME ...` compiles some in a
+process of its own and tells its progress, a line "DONE TOTAL NAME" each.
+"""
+import sys
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from rtcore import bvh, eye, film as films, fog as fogs, jit, shading
+from rtcore.camera import Camera
+from rtcore.flatten import DTYPES, flatten
+from rtcore.lights import AIMS, directional, point
+from rtcore.plan import plan
+from rtcore.scene import Background, Fog, Material, Node, Scene
+from rtcore.settings import Settings
+from rtcore.shapes import KINDS
+from rtcore.trace import CLOSEST, COUNTS
+from rtcore.wave import new_beam, new_wave
+
+
+def _wave(dtype):
+    """A wave of one 8 x 8 tile, cast."""
+    wave, target = new_wave(64, dtype), np.empty(64, np.int32)
+    n = eye.cast(wave, target, Camera().rays(8, 8), np.array([0, 0, 8, 8, 1, 0, 8, 8], np.int64), 0, 0)
+    return wave, target, n
+
+
+def _look():
+    return shading.make_look((), np.zeros(0, np.int32), np.zeros(3), Background(), (0, 1, 0))
+
+
+def _core(dtype):
+    wave, target, n = _wave(dtype)
+    film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
+    shading.glow(wave, n, _look())
+    films.note_first_hits(film, wave, n, target, np.zeros(0, np.int32))
+    films.deposit(wave, n, sample)
+    films.commit(film, sample, n, target)
+    pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
+    films.develop(film, 8, 8, 1, pixels)
+    films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32))
+    films.encode(pixels)
+
+
+def _tree(dtype):
+    low = np.random.default_rng(0).random((8, 3))
+    bvh.build(low, low + 0.1, 2)
+
+
+def _lit(dtype):
+    wave, _, n = _wave(dtype)
+    beam = new_beam(n, dtype)
+    shading.light_up(wave, n, _look(), np.ones(3), beam)
+    shading.gather(wave, beam, 0)
+
+
+def _fog(dtype):
+    wave, _, n = _wave(dtype)
+    fogs.dim(wave, n, fogs.numbers(Fog()))
+
+
+def _bounce(dtype):
+    wave, _, n = _wave(dtype)
+    shading.bounce(wave, n, _look(), new_wave(2 * n, dtype), np.zeros(len(COUNTS), np.int64))
+
+
+def _light(kind):
+    def compile_light(dtype):
+        wave, _, n = _wave(dtype)
+        example = {point.Point: point.Point(position=(0, 0, 0)), directional.Directional: directional.Directional(direction=(0, 0, 1))}[kind]
+        AIMS[kind](wave, n, example.numbers(), new_beam(n, dtype).aim)
+    return compile_light
+
+
+def _kind(kind):
+    def compile_kind(dtype):
+        wave, _, n = _wave(dtype)
+        precision = next(name for name, d in DTYPES.items() if d == dtype)
+        scene = Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())])
+        (group,) = flatten(scene, precision).groups
+        kind.intersect(wave.rays, n, group.tree, group.table, 0, CLOSEST)
+        kind.surface(wave.rays, n, wave.surface, group.table, 0)
+    return compile_kind
+
+
+#: Each group: the module whose source it hangs on, and how to compile it for a precision.
+GROUPS: dict[str, tuple[str, Callable]] = {
+    "core": ("rtcore.warm", _core), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit), "bounce": ("rtcore.shading", _bounce),
+    "fog": ("rtcore.fog", _fog),
+    **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},
+    **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
+}
+ALL = tuple(f"{name}.{precision}" for precision in DTYPES for name in GROUPS)
+
+
+def _marker(name: str):
+    return jit.cache_folder(GROUPS[name.split(".")[0]][0]) / f"{name}.warm"
+
+
+def missing(scene: Scene, settings: Settings) -> list[str]:
+    """Names of the kernel groups that this render needs and the cache lacks. Compiles nothing."""
+    return [name for name in plan(scene, settings).kernels if not _marker(name).exists()]
+
+
+def compile_kernels(names: Iterable[str], progress: Callable[[int, int, str], None] = lambda done, total, name: None) -> None:
+    """Compile these groups into the cache; `progress(done, total, name)` before each and, with done = total, at the end.
+
+    Raises KeyError for a name that is not in ALL.
+    """
+    names = list(names)
+    for done, name in enumerate(names):
+        group, precision = name.split(".")
+        progress(done, len(names), name)
+        GROUPS[group][1](DTYPES[precision])
+        marker = _marker(name)
+        marker.parent.mkdir(parents=True, exist_ok=True)
+        marker.touch()
+    progress(len(names), len(names), "")
+    jit.prune()
+
+
+def main(names: list[str]) -> int:
+    """The helper process: compile `names`, a line of progress each."""
+    unknown = [name for name in names if name not in ALL]
+    if unknown:
+        print(f"rtcore.warm: no kernels are called {', '.join(unknown)}", file=sys.stderr)
+        return 2
+    compile_kernels(names or ALL, lambda done, total, name: print(done, total, name, flush=True))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
