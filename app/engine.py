@@ -1,0 +1,54 @@
+"""The one door from the window to the compiled half of rtcore. Made and used on the render thread only."""
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from app.options import Options
+from rtcore.camera import Camera
+from rtcore.scene import Scene
+
+if TYPE_CHECKING:
+    from rtcore.progressive import Frame, RenderRequest
+
+
+class Job(NamedTuple):
+    """What the window wants to see. Jobs are numbered in the order they are asked for."""
+
+    number: int
+    scene: Scene
+    camera: Camera
+    options: Options
+    size: tuple[int, int]       # width, height in pixels of the picture
+    continues: bool = False     # a step of the same drag as the job before: that one may still show its first pass
+    document: int = 0           # counts opened files: kernels are compiled anew only for another one
+
+
+class Engine:
+    """rtcore's renderer behind the few calls the worker needs. Importing it takes a second: numba comes with it."""
+
+    def __init__(self):
+        from rtcore import film, progressive, warm
+        self._film, self._progressive, self._warm = film, progressive, warm
+        self._renderer = progressive.Renderer()
+
+    def request(self, job: Job) -> "RenderRequest":
+        """The renderer's own form of a job."""
+        settings = self._progressive.Settings(size=job.size, **job.options.settings())
+        return self._progressive.RenderRequest(job.scene, job.camera, settings)
+
+    def missing(self, request: "RenderRequest") -> list[str]:
+        """Names of the kernels that this request needs and the cache does not have yet."""
+        return self._warm.missing(request.scene, request.settings)
+
+    def frames(self, request: "RenderRequest", cancelled: Callable[[], bool]) -> "Iterator[Frame]":
+        """The passes of a picture, from coarse to fine."""
+        return self._renderer.frames(request, cancelled)
+
+    def encode(self, pixels: np.ndarray, out: np.ndarray):
+        """Linear light into the bytes of QImage.Format_RGB32."""
+        self._film.encode(pixels, out)
+
+    def close(self):
+        """End the renderer's threads."""
+        self._renderer.close()

@@ -1,0 +1,8 @@
+"""The panels: one file each. Listed once, here, in the order in which they stand."""
+from app.panels.camera import CameraPanel
+from app.panels.fog import FogPanel
+from app.panels.properties import PropertiesPanel
+from app.panels.render import RenderPanel
+from app.panels.tree import TreePanel
+
+PANELS = (TreePanel, CameraPanel, FogPanel, RenderPanel, PropertiesPanel)

@@ -1,0 +1,91 @@
+"""The status bar: how far the picture is, how fast, and what is under the cursor. Every part has its place, so nothing jumps."""
+import math
+
+from PySide6.QtCore import Qt, Slot
+from PySide6.QtWidgets import QLabel, QSizePolicy, QStatusBar, QWidget
+
+from app.session import Session
+
+TRACED = ("primary", "shadow", "reflection", "refraction")
+PARTS = (("pass", "samples 65536/65536", "How far the picture is: the lattice that is traced, then the rays through each pixel"),
+         ("speed", "9,999.9 Mrays/s", "Rays traced in a second, in millions: primary, shadow, reflected and refracted ones"),
+         ("elapsed", "99:59:59.9", "How long this picture has been traced"),
+         ("pixel", "99999, 99999", "The pixel under the cursor, counted from the top left"),
+         ("distance", "at 1.23456e+10", "How far from the eye that is which the cursor points at, in scene units"))
+
+
+def pass_text(frame) -> str:
+    """How far a frame is."""
+    if frame.spacing > 1:
+        return f"1/{frame.spacing} lattice"
+    return f"{'done, ' if frame.done else ''}samples {frame.samples}"
+
+
+def speed_text(frame) -> str:
+    """Million rays a second of a frame so far."""
+    rays = sum(frame.rays.get(kind, 0) for kind in TRACED)
+    return f"{rays / frame.elapsed / 1e6:,.1f} Mrays/s" if frame.elapsed > 0 else ""
+
+
+def elapsed_text(seconds: float) -> str:
+    """Seconds as 4.2 s, 3:07.5 or 1:02:03.4."""
+    minutes, rest = divmod(seconds, 60)
+    if not minutes:
+        return f"{rest:.1f} s"
+    hours, minutes = divmod(int(minutes), 60)
+    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+
+
+class Status(QStatusBar):
+    """Left what is under the cursor, right the numbers, each of a fixed width."""
+
+    def __init__(self, session: Session, parent: QWidget | None = None):
+        super().__init__(parent)
+        self._session = session
+        self.setSizeGripEnabled(False)
+        self.setAccessibleName("Status")
+        self.under = QLabel()
+        self.under.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.under.setToolTip("What is under the cursor")
+        self.under.setAccessibleName("Under the cursor")
+        self.under.setContentsMargins(8, 0, 0, 0)
+        self.addWidget(self.under, 1)
+        self.parts: dict[str, QLabel] = {}
+        for name, widest, tip in (PARTS[3], PARTS[4], *PARTS[:3]):
+            label = QLabel()
+            label.setToolTip(tip)
+            label.setAccessibleName(name.capitalize())
+            label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            label.setFixedWidth(label.fontMetrics().horizontalAdvance(widest) + 10)
+            self.addPermanentWidget(label)
+            self.parts[name] = label
+        session.frame_changed.connect(self._frame)
+        session.hover_changed.connect(self._hover)
+        session.compiling_changed.connect(self._compiling)
+
+    @Slot()
+    def _frame(self):
+        shown = self._session.shown
+        text = pass_text(shown.frame)
+        self.parts["pass"].setText(text if shown.frame.spacing > 1 else f"{text}/{int(shown.job.options.samples)}")
+        self.parts["speed"].setText(speed_text(shown.frame))
+        self.parts["elapsed"].setText(elapsed_text(shown.frame.elapsed))
+
+    @Slot()
+    def _hover(self):
+        under = self._session.under
+        if under is None:
+            texts = "", "", ""
+        else:
+            name = self._session.name_of(under.place) if under.place else "Background"
+            texts = name, f"{under.x}, {under.y}", f"at {under.distance:.5g}" if math.isfinite(under.distance) else ""
+        for label, text in zip((self.under, self.parts["pixel"], self.parts["distance"]), texts):
+            label.setText(text)
+
+    @Slot()
+    def _compiling(self):
+        compiling = self._session.compiling
+        if compiling is not None:
+            self.under.setText(str(compiling))
+        else:
+            self._hover()
