@@ -15,7 +15,8 @@ class FileError(ValueError):
         self.path, self.problem, self.line, self.place = os.fspath(path), problem, line, place
 
     def __str__(self) -> str:
-        parts = [self.path, f"line {self.line}" if self.line else "", self.place, self.problem]
+        place = self.place if len(self.place) <= 120 else f"{self.place[:60]} ... {self.place[-55:]}"
+        parts = [self.path, f"line {self.line}" if self.line else "", place, self.problem]
         return " ".join(": ".join(filter(None, parts)).split())
 
     @classmethod

@@ -73,7 +73,7 @@ def _events(text: str) -> Iterator:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         said = ", ".join(filter(None, (getattr(error, "context", None), getattr(error, "problem", None)))) or str(error)
-        raise TextError(f"expected YAML, got an error {said}" if said.startswith("while") else f"expected YAML, got: {said}",
+        raise TextError(f"expected YAML or JSON, but {said}",
                         mark.line + 1 if mark else 1) from None
     finally:
         loader.dispose()

@@ -5,6 +5,7 @@ case and takes the fields of that class, so that a new one needs nothing here. E
 module adds the path to it, and on an error the line.
 """
 import functools
+import json
 import os
 import typing
 from typing import Any
@@ -14,8 +15,8 @@ import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.fields import FieldError, Record, fields_of, number
-from rtcore.files._errors import FileError, Said, read_text, unknown
-from rtcore.files._meshes import MESHES, MeshFiles
+from rtcore.files._errors import FileError, Said, WriteError, read_text, unknown
+from rtcore.files._meshes import MeshFiles
 from rtcore.files._writing import replace_file
 from rtcore.files._yaml import TextError, line_of, parse
 from rtcore.files._yamlout import Block, dump
@@ -35,6 +36,7 @@ def _by_word(classes: tuple[type, ...]) -> dict[str, type]:
 SHAPE_WORDS, LIGHT_WORDS, TRANSFORM_WORDS = _by_word(SHAPES), _by_word(LIGHTS), _by_word(TRANSFORMS)
 NODE_WORDS = tuple(name for name in fields_of(Node) if name not in ("shape", "children", "use"))
 PLACES = (*SHAPE_WORDS, "group", "use")     # a node has exactly one of these
+ARRAYS = ("vertices", "faces", "normals")     # of a mesh; its file has them
 SCENE_WORDS = ("rayscope", *(name for name in fields_of(Scene) if name != "objects"), "scene")
 
 
@@ -50,17 +52,23 @@ def load(path: str | os.PathLike) -> Scene:
 
 
 def save(scene: Scene, path: str | os.PathLike) -> None:
-    """Write a scene so that `load` gives an equal one; the old file is intact until the new one is complete.
+    """Write a scene, as YAML or JSON, so that `load` gives an equal one; the old file is intact until the new one is complete.
 
     A mesh that is what its file holds is written as that file's name, relative to the scene's folder; any other with all
     its numbers. WriteError if the scene can't be written.
     """
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in SUFFIXES:
+        raise WriteError.expected(path, "a name that ends in " + ", ".join(SUFFIXES), suffix or os.path.basename(path))
+    plain = _Writer(os.path.dirname(os.path.abspath(path))).scene(scene)
     try:
-        data = dump(_Writer(os.path.dirname(os.path.abspath(path))).scene(scene)).encode()
+        data = (json.dumps(plain, indent=1, ensure_ascii=False) if suffix == ".json" else dump(plain)).encode()
+    except UnicodeEncodeError as error:
+        raise WriteError.expected(path, "text that UTF-8 can hold", Said(f"the lone surrogate U+{ord(error.object[error.start]):04X}")) from None
     except ValueError as error:
-        raise FileError(path, str(error)) from None
+        raise WriteError(path, str(error)) from None
     if len(data) > MOST_BYTES:
-        raise FileError.expected(path, f"a scene of at most {MOST_BYTES >> 20} MiB as text, which is all that is read back",
+        raise WriteError.expected(path, f"a scene of at most {MOST_BYTES >> 20} MiB as text, which is all that is read back",
                                  Said(f"{len(data) >> 20} MiB"))
     replace_file(path, lambda file: file.write(data))
 
@@ -78,7 +86,9 @@ def _records_in(cls: type) -> dict[str, type]:
 
 @functools.cache
 def _fields(cls: type) -> tuple[msgspec.structs.FieldInfo, ...]:
-    return msgspec.structs.fields(cls)
+    """The fields of a record, its own before those of the family it belongs to, as people would write them."""
+    family = {name for base in cls.__bases__ if issubclass(base, Record) for name in fields_of(base)}
+    return tuple(sorted(msgspec.structs.fields(cls), key=lambda field: field.name in family))
 
 
 @functools.cache
@@ -156,7 +166,7 @@ class _Reader:
         _refuse_unknown(data, known)
         for name in _required(cls):
             if name not in data:
-                known[name].take(None)      # says what it expects, if it does not take nothing
+                _within(name, known[name].take, None)       # says what it expects, if it does not take nothing
                 raise FieldError("a value", None, name)
         inner = {name: _within(name, self.record, sub, data[name]) for name, sub in _records_in(cls).items() if data.get(name) is not None}
         return cls(**{**data, **inner} if inner else data)
@@ -190,7 +200,7 @@ class _Reader:
 
     def shape(self, cls: type, data: Any):
         if cls is Mesh and isinstance(data, dict) and "file" in data and "vertices" not in data:
-            _refuse_unknown(data, [name for name in fields_of(Mesh) if name not in ("vertices", "faces", "normals")])
+            _refuse_unknown(data, [name for name in fields_of(Mesh) if name not in ARRAYS])
             mesh = _within("file", self._meshes.mesh, data["file"])
             return mesh if set(data) == {"file"} else msgspec.structs.replace(mesh, **{**data, "file": mesh.file})
         return self.record(cls, data)
@@ -272,7 +282,7 @@ class _Writer:
         data = self.record(shape)
         name = self._meshes.name_of(shape) if isinstance(shape, Mesh) and shape.file else None
         if name is not None:
-            data = {"file": name, **{key: value for key, value in data.items() if key not in MESHES}}
+            data = {**{key: value for key, value in data.items() if key not in ARRAYS}, "file": name}
         return data
 
     def one_word(self, record: Record) -> dict:

@@ -1,0 +1,27 @@
+"""Scene files: one file a format. Listed once, here."""
+import os
+
+from rtcore.files import image, mesh, nff, scene
+from rtcore.files._errors import FileError, WriteError, unknown
+from rtcore.files._writing import writable
+from rtcore.files.image import save_image
+from rtcore.files.scene import save
+from rtcore.scene import Scene
+
+FORMATS = (scene, nff, mesh)    # each has its SUFFIXES and load(path) -> Scene
+LOADABLE = tuple(suffix for form in FORMATS for suffix in form.SUFFIXES)
+PICTURES = image.SUFFIXES
+
+__all__ = ["FORMATS", "LOADABLE", "PICTURES", "FileError", "WriteError", "load", "save", "save_image", "writable"]
+
+
+def load(path: str | os.PathLike) -> Scene:
+    """The scene in a file, whose suffix says the format; FileError, in one line, if there is none or anything is wrong."""
+    if os.path.isdir(path):
+        raise FileError(path, "expected a file, got a folder")
+    suffix = os.path.splitext(path)[1].lower()
+    for form in FORMATS:
+        if suffix in form.SUFFIXES:
+            return form.load(path)
+    expected, got = unknown(suffix or os.path.basename(path), LOADABLE)
+    raise FileError.expected(path, "a name that ends in " + expected, got)

@@ -1,0 +1,88 @@
+"""Pictures out: .png in sRGB with 8 bits a channel, .exr in linear light with 32-bit floats."""
+import io
+import os
+
+import numpy as np
+
+from rtcore.files._errors import WriteError
+from rtcore.files._writing import replace_file
+
+SUFFIXES = (".png", ".exr")
+_ROWS = 1 << 20     # pixels that are turned to 8 bits at a time
+
+
+def save_image(pixels: np.ndarray, path: str | os.PathLike, *, software: str = "Rayscope", text: dict[str, str] | None = None) -> None:
+    """Write linear pixels (h, w, 3) as the suffix says; the old file is intact until the new one is complete.
+
+    PNG: clipped to 0 .. 1, what is not a number black, by the sRGB curve to 8 bits. EXR: the numbers as they are, in float32.
+    `text` goes along: PNG text chunks, or attributes of the EXR header. WriteError if the picture can't be written.
+    """
+    pixels = np.asarray(pixels)
+    if pixels.ndim != 3 or pixels.shape[2] != 3 or 0 in pixels.shape:
+        raise ValueError(f"expected pixels of shape (h, w, 3), got {pixels.shape}")
+    check_suffix(path)
+    text = {"Software": software, **(text or {})}
+    if os.fspath(path).lower().endswith(".exr"):
+        data = _exr(path, pixels, text)
+    else:
+        data = _png(pixels, text)
+    replace_file(path, lambda file: file.write(data))
+
+
+def check_suffix(path: str | os.PathLike) -> None:
+    """WriteError if no picture can be written under that name: its suffix is unknown, or what it needs is not installed."""
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in SUFFIXES:
+        raise WriteError.expected(path, "a picture whose name ends in " + " or ".join(SUFFIXES), suffix or os.path.basename(path))
+    if suffix == ".exr":
+        _openexr(path)
+
+
+def srgb_bytes(pixels: np.ndarray) -> np.ndarray:
+    """8-bit sRGB (h, w, 3) of linear pixels (IEC 61966-2-1), rounded to the nearest."""
+    result = np.empty(pixels.shape, np.uint8)
+    step = max(_ROWS // pixels.shape[1], 1)
+    for row in range(0, len(pixels), step):
+        x = np.clip(np.nan_to_num(pixels[row:row + step].astype(np.float32), nan=0.0, posinf=1.0, neginf=0.0), 0, 1)
+        curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** np.float32(1 / 2.4) - np.float32(0.055))
+        result[row:row + step] = curve * 255 + 0.5
+    return result
+
+
+def _png(pixels: np.ndarray, text: dict[str, str]) -> bytes:
+    from PIL import Image, PngImagePlugin
+
+    info = PngImagePlugin.PngInfo()
+    info.add(b"sRGB", b"\0")    # rendering intent: perceptual
+    for key, value in text.items():
+        info.add_text(key, value)
+    out = io.BytesIO()
+    Image.fromarray(srgb_bytes(pixels)).save(out, "PNG", pnginfo=info)
+    return out.getvalue()
+
+
+def _openexr(path):
+    try:
+        import OpenEXR
+    except ImportError:
+        raise WriteError(path, "an .exr file needs the package OpenEXR: pip install rayscope[exr]") from None
+    return OpenEXR
+
+
+def _exr(path, pixels: np.ndarray, text: dict[str, str]) -> bytes:
+    """The file's bytes; OpenEXR writes only to a name, so it gets one of its own."""
+    import tempfile
+
+    OpenEXR = _openexr(path)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **{key[:1].lower() + key[1:]: value for key, value in text.items()}}
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            beside = os.path.join(folder, "picture.exr")
+            with OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels, np.float32)}) as file:
+                file.write(beside)
+            with open(beside, "rb") as written:
+                return written.read()
+    except OSError as error:
+        raise WriteError(path, f"cannot be written: {error.strerror or error}") from None
+    except RuntimeError as error:
+        raise WriteError(path, f"cannot be written: {error}") from None
