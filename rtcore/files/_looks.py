@@ -67,9 +67,9 @@ def _from_gltf(material: Any) -> Material:
     emission = np.zeros(3) if material.emissiveFactor is None else np.asarray(material.emissiveFactor, float)
     color = tuple(np.clip(color, 0, 1).tolist())
     clear = _clip(1 - alpha) if material.alphaMode == "BLEND" else 0.0
-    return Material(color=color, diffuse=1 - mirror, specular=_clip(0.04 + 0.3 * (1 - rough) + 0.5 * metal * (1 - rough)),
-                    shininess=float(np.clip(2 / max(rough, 0.15) ** 4 - 2, 2, 2000)), reflection=mirror, tint=color if mirror else (1.0, 1.0, 1.0),
-                    transmission=clear, ior=1.0 if clear else 1.5,
+    return Material(color=color, diffuse=(1 - mirror) * (1 - clear), specular=_clip(0.04 + 0.3 * (1 - rough) + 0.5 * metal * (1 - rough)),
+                    shininess=float(np.clip(2 / max(rough, 0.15) ** 4 - 2, 2, 2000)),
+                    reflection=mirror, tint=color if mirror else (1.0, 1.0, 1.0), transmission=clear, ior=1.0 if clear else 1.5,
                     emission=tuple(np.maximum(emission, 0).tolist()))
 
 

@@ -116,8 +116,8 @@ def _through_trimesh(path, suffix: str, data: bytes) -> tuple[list[tuple[str, np
                     matrix = np.array(matrix, np.float64)
                     loaded.append((str(node), None if np.array_equal(matrix, np.eye(4)) else matrix, mesh))
     except Exception as error:      # whatever it stumbles over in a broken file: KeyError, IndexError, struct.error ...
-        said = " ".join(str(error).split())
-        raise FileError.expected(path, f"a sound {suffix} file", Said(f"one that can't be read: {said[:120] or type(error).__name__}")) from None
+        said = " ".join(str(error).split())[:120] or type(error).__name__
+        raise FileError.expected(path, f"a sound {suffix} file", Said(f"one that can't be read: {said}")) from None
     return loaded[::-1] if suffix == ".obj" else loaded, resolver.missing      # trimesh takes an OBJ's parts from the last to the first
 
 

@@ -31,7 +31,8 @@ def _stl(path, data: bytes) -> int:
     if len(data) == 84 + 50 * count:
         return count
     if b"\0" in data[:512] or data[:512].lstrip()[:5].lower() != b"solid":
-        raise FileError.expected(path, f"a text STL, or a binary one of 84 + 50 x {count:,} bytes as its header says", Said(f"{len(data):,} bytes"))
+        raise FileError.expected(path, f"a text STL, or a binary one of 84 + 50 x {count:,} bytes as its header says",
+                                 Said(f"{len(data):,} bytes"))
     if b"endsolid" not in data[-4096:].lower():
         raise FileError.expected(path, "endsolid", Said("the end of the file"), line=data.count(b"\n") + 1)
     return data.count(b"endfacet")
@@ -62,7 +63,8 @@ def _off(path, data: bytes) -> int:
     vertices, faces = map(int, numbers[:2])
     there = len(lines) - (1 if first else 2)
     if there < vertices + faces:
-        raise FileError.expected(path, f"{vertices:,} lines of vertices and {faces:,} of faces, as its header says", Said(f"{there:,} of them"))
+        raise FileError.expected(path, f"{vertices:,} lines of vertices and {faces:,} of faces, as its header says",
+                                 Said(f"{there:,} of them"))
     return faces
 
 

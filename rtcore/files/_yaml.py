@@ -68,8 +68,8 @@ def _events(text: str) -> Iterator:
         while loader.check_event():
             yield loader.get_event()
     except yaml.reader.ReaderError as error:
-        place = error.position if isinstance(error.position, int) else 0
-        raise TextError("expected printable text, got " + shown(text[place:place + 1] or error.reason), text.count("\n", 0, place) + 1) from None
+        there = text.encode()[:error.position].decode(errors="ignore")     # it counts bytes
+        raise TextError(f"expected printable text, got the character U+{error.character:04X}", there.count("\n") + 1) from None
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         said = ", ".join(filter(None, (getattr(error, "context", None), getattr(error, "problem", None)))) or str(error)

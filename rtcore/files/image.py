@@ -22,10 +22,7 @@ def save_image(pixels: np.ndarray, path: str | os.PathLike, *, software: str = "
         raise ValueError(f"expected pixels of shape (h, w, 3), got {pixels.shape}")
     check_suffix(path)
     text = {"Software": software, **(text or {})}
-    if os.fspath(path).lower().endswith(".exr"):
-        data = _exr(path, pixels, text)
-    else:
-        data = _png(pixels, text)
+    data = _exr(path, pixels, text) if os.fspath(path).lower().endswith(".exr") else _png(pixels, text)
     replace_file(path, lambda file: file.write(data))
 
 
@@ -74,7 +71,8 @@ def _exr(path, pixels: np.ndarray, text: dict[str, str]) -> bytes:
     import tempfile
 
     OpenEXR = _openexr(path)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **{key[:1].lower() + key[1:]: value for key, value in text.items()}}
+    header = {key[:1].lower() + key[1:]: value for key, value in text.items()}
+    header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with tempfile.TemporaryDirectory() as folder:
             beside = os.path.join(folder, "picture.exr")

@@ -2,8 +2,8 @@
 
 A file is a stream of tokens: an entity's word, then its numbers, which may break across lines. What a fill lights is gathered
 into as few nodes as stay readable: the triangles of a fill are one mesh, its patches another, its spheres a group, and so on.
-Colours are display values, and made linear here. A light without a colour of its own has the intensity 1/sqrt(n) of n lights,
-and the ambient light is the 0.1 of the format's reference reader.
+Colours are display values, and made linear here; so is the ambient light, the 0.1 of the format's reference reader. A light
+without a colour of its own has the intensity 1/sqrt(n) of n lights.
 """
 import math
 import os
@@ -21,11 +21,12 @@ from rtcore.shapes import Cone, Cylinder, Mesh, Polygon, Sphere
 
 SUFFIXES = (".nff",)
 MOST_BYTES = 64 * 2**20
-AMBIENT = 0.1
+AMBIENT = linear_from_srgb(0.1)
+BLINN = 4.0     # Phong's cosine to the power n is about as wide as Blinn's to the power 4n
 ENTITIES = ("v", "b", "l", "f", "s", "c", "p", "pp")
 
 _VIEW = {"from": 3, "at": 3, "up": 3, "angle": 1, "hither": 1, "resolution": 2}     # words of a view and how many numbers each has
-_OURS = {"lookfrom": "from", "lookat": "at", "fov": "angle", "diffuse": "Kd", "specular": "Ks", "apex": "apex centre"}    # field -> NFF's name
+_NAMES = {"lookfrom": "from", "lookat": "at", "fov": "angle", "diffuse": "Kd", "specular": "Ks", "apex": "apex centre"}    # NFF's, of fields
 _FLAT = 1e-12       # a polygon with less area than this share of its extent squared has none
 
 
@@ -83,7 +84,7 @@ class _Reader:
                 readers[word]()
             except FieldError as error:
                 raise FileError.expected(self._path, error.expected, error.got, line=self._line,
-                                         place=f"{word} {_OURS.get(error.path, error.path)}".strip()) from None
+                                         place=f"{word} {_NAMES.get(error.path, error.path)}".strip()) from None
         if self._camera is None:
             self._line = self._lines[-1] if self._lines else 1
             raise self._wrong("a view (v)", Said("the end of the file"))
@@ -104,11 +105,12 @@ class _Reader:
             numbers = [float(word) for word in words]
         except ValueError:
             numbers = []
+        wanted = f"{count:,} number{'s' * (count > 1)} ({what})"
         if len(numbers) < count or not all(map(math.isfinite, numbers)) or any("_" in word for word in words):
             for i, word in enumerate(words):
                 if not _is_number(word):
-                    raise self._wrong(f"{count} number{'s' * (count > 1)} ({what})", word, self._lines[self._at + i])
-            raise self._wrong(f"{count} number{'s' * (count > 1)} ({what})", Said(f"the end of the file after {len(words)}"), self._lines[-1])
+                    raise self._wrong(wanted, word, self._lines[self._at + i])
+            raise self._wrong(wanted, Said(f"the end of the file after {len(words)}"), self._lines[-1])
         self._at += count
         return numbers
 
@@ -140,10 +142,10 @@ class _Reader:
 
     def _read_f(self):
         r, g, b, diffuse, specular, shine, clear, index = self._numbers(8, "r g b Kd Ks Shine T ior of a fill")
-        color = tuple(_linear(min(max(c, 0.0), 1.0)) for c in (r, g, b))
+        color = tuple(linear_from_srgb(min(max(c, 0.0), 1.0)) for c in (r, g, b))
         # The index may be anything, even 0, where nothing goes through.
         self._fills.append(_Fill(Material(
-            color=color, diffuse=diffuse, specular=specular, shininess=max(shine, 1e-3), reflection=min(specular, 1.0), fresnel=False,
+            color=color, diffuse=diffuse, specular=specular, shininess=max(BLINN * shine, 1e-3), reflection=min(specular, 1.0), fresnel=False,
             transmission=min(max(clear, 0.0), 1.0), ior=index if index > 0 else 1.0), [], [], [], [], []))
 
     def _read_s(self):
@@ -203,7 +205,7 @@ class _Reader:
         color = self._numbers(3, f"colour {what}" if not what.startswith("colour") else what)
         if min(color) < 0:
             raise self._wrong("a colour whose parts are at least 0", color)
-        return tuple(_linear(c) if c <= 1 else c for c in color)
+        return tuple(linear_from_srgb(c) if c <= 1 else c for c in color)
 
     # --- the scene ---
 
@@ -233,7 +235,8 @@ def _nodes_of(fill: _Fill) -> list[Node]:
     nodes = []
     if fill.triangles:
         corners = np.array(fill.triangles).reshape(-1, 3)
-        nodes.append(Node(name=_counted(len(corners) // 3, "triangle"), shape=Mesh(vertices=corners, faces=np.arange(len(corners)).reshape(-1, 3))))
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        nodes.append(Node(name=_counted(len(faces), "triangle"), shape=Mesh(vertices=corners, faces=faces)))
     if fill.patches:
         corners = np.array(fill.patches).reshape(-1, 6)
         vertices, faces = corners[:, :3].copy(), np.arange(len(corners)).reshape(-1, 3)
@@ -285,10 +288,6 @@ def _has_no_area(corners: list[list[float]]) -> bool:
 def _turned(sides: str, inside: bool) -> str:
     """The visible sides of a round object whose radius was negative: only the inside, unless it transmits."""
     return "back" if inside and sides == "front" else sides
-
-
-def _linear(value: float) -> float:
-    return linear_from_srgb(value)
 
 
 def _is_number(word: str) -> bool:

@@ -4,6 +4,7 @@ The words of the format are those of the records: a shape's, light's or transfor
 case and takes the fields of that class, so that a new one needs nothing here. Each record checks what it is given; this
 module adds the path to it, and on an error the line.
 """
+import contextlib
 import functools
 import json
 import os
@@ -64,7 +65,8 @@ def save(scene: Scene, path: str | os.PathLike) -> None:
     try:
         data = (json.dumps(plain, indent=1, ensure_ascii=False) if suffix == ".json" else dump(plain)).encode()
     except UnicodeEncodeError as error:
-        raise WriteError.expected(path, "text that UTF-8 can hold", Said(f"the lone surrogate U+{ord(error.object[error.start]):04X}")) from None
+        alone = ord(error.object[error.start])
+        raise WriteError.expected(path, "text that UTF-8 can hold", Said(f"the lone surrogate U+{alone:04X}")) from None
     except ValueError as error:
         raise WriteError(path, str(error)) from None
     if len(data) > MOST_BYTES:
@@ -210,10 +212,8 @@ class _Reader:
 
     def transform(self, data: Any):
         if isinstance(data, dict) and data.keys() == {"scale"}:
-            try:
+            with contextlib.suppress(TypeError, OverflowError):     # then it is three numbers, or an error with its usual words
                 data = {"scale": [number(data["scale"])] * 3}
-            except (TypeError, OverflowError):
-                pass        # three numbers, or an error with its usual words
         return self.one_word(data, "a transform", TRANSFORM_WORDS)
 
     def one_word(self, data: Any, what: str, words: dict[str, type]):
@@ -247,8 +247,10 @@ class _Writer:
     def scene(self, scene: Scene) -> dict:
         data: dict[str, Any] = Block(rayscope=VERSION)
         data.update({name: text for name, text in (("name", scene.name), ("note", scene.note)) if text})
-        data.update({name: self.record(value) for name, value in (("camera", scene.camera), ("background", scene.background), ("fog", scene.fog))
-                     if value is not None and (name != "background" or value != Background())})
+        background = None if scene.background == Background() else scene.background
+        for name, value in (("camera", scene.camera), ("background", background), ("fog", scene.fog)):
+            if value is not None:
+                data[name] = self.record(value)
         if scene.lights is not None:
             data["lights"] = [self.one_word(light) for light in scene.lights]
         if scene.materials:
@@ -279,11 +281,8 @@ class _Writer:
         return data
 
     def shape(self, shape) -> dict:
-        data = self.record(shape)
         name = self._meshes.name_of(shape) if isinstance(shape, Mesh) and shape.file else None
-        if name is not None:
-            data = {**{key: value for key, value in data.items() if key not in ARRAYS}, "file": name}
-        return data
+        return self.record(shape) if name is None else {"file": name, **self.record(shape, without=(*ARRAYS, "file"))}
 
     def one_word(self, record: Record) -> dict:
         """A light or a transform: its word with its fields, or with the value of its only field."""
@@ -292,9 +291,11 @@ class _Writer:
             return {word: record.factors[0]}
         return {word: _plain(getattr(record, fields[0].name)) if len(fields) == 1 else self.record(record)}
 
-    def record(self, record: Record) -> dict:
+    def record(self, record: Record, without: tuple[str, ...] = ()) -> dict:
         data = {}
         for field in _fields(type(record)):
+            if field.name in without:
+                continue
             value = getattr(record, field.name)
             if value is None and field.default is None:
                 continue
