@@ -120,7 +120,7 @@ def _split(low, high, leaf_most, box, link, order):
                 if min(int((0.5 * low[p, best_axis] + 0.5 * high[p, best_axis] - c_low[best_axis]) / width * BINS), BINS - 1) <= best_bin:
                     order[j], order[middle] = order[middle], order[j]
                     middle += 1
-        if middle == first or middle == last:
+        if middle in (first, last):
             best_axis, middle = max(best_axis, 0), (first + last) // 2
         link[node, 1] = -1 - best_axis
         stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3] = middle, last, node, depth + 1
@@ -167,7 +167,8 @@ def validate(tree: Tree, low: np.ndarray, high: np.ndarray) -> None:
             assert inside.all(), f"a primitive sticks out of leaf {node}"
             continue
         for child in (node + 1, first):
-            assert (tree.box[child, :3] >= tree.box[node, :3]).all() and (tree.box[child, 3:] <= tree.box[node, 3:]).all(), f"node {child} sticks out"
+            inside = (tree.box[child, :3] >= tree.box[node, :3]).all() and (tree.box[child, 3:] <= tree.box[node, 3:]).all()
+            assert inside, f"node {child} sticks out"
             todo.append((child, depth + 1))
     assert (seen == 1).all(), "a primitive in no leaf or in several"
 
@@ -246,8 +247,8 @@ def shrink(walk, rays, start):
     """After a leaf: the active vectors need not look past what they hit."""
     for g in range(GROUPS):
         if (walk.state[1] >> g) & 1:
-            far = load(rays.ray, T, start + g * 8)
-            store(walk.coarse, 9, g * 8, least(load(walk.coarse, 9, g * 8), _reach(far, load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))))
+            reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
+            store(walk.coarse, 9, g * 8, least(load(walk.coarse, 9, g * 8), reach))
 
 
 @inline

@@ -41,10 +41,11 @@ class Camera(Record, frozen=True, kw_only=True):
     lookat: Annotated[Vec, Vector(help="the point in the middle of the picture", unit="scene units")] = (0.0, 0.0, 0.0)
     up: Annotated[Vec, Vector(nonzero=True, help="which way is up; need not be at right angles to the view")] = (0.0, 1.0, 0.0)
     fov: Annotated[float, Number(above=0, below=180, help="vertical field of view", unit="degrees")] = 40.0
-    span: Annotated[str, Choice(words=("edges", "centers"), help="what the fov spans: the picture's edges, or the centres of its outer rows")] = "edges"
+    span: Annotated[str, Choice(words=("edges", "centers"), help="fov from edge to edge, or between the outer rows' centres")] = "edges"
 
     def check(self):
-        w = np.subtract(self.lookat, self.lookfrom)
+        with np.errstate(over="ignore"):
+            w = np.subtract(self.lookat, self.lookfrom)
         if not np.isfinite(w).all() or not w.any():
             raise FieldError("a point other than lookfrom", self.lookat, "lookat")
         w /= np.abs(w).max()
@@ -91,25 +92,15 @@ class Camera(Record, frozen=True, kw_only=True):
         pitch = self.pitch(ny)
         return nx / 2 - a / c / pitch, ny / 2 - b / c / pitch
 
-    def at(self, *, lookfrom=None, lookat=None, **other) -> "Camera":
+    def at(self, **fields) -> "Camera":
         """The camera with these fields in place of its own; FieldError if the result is degenerate."""
-        if lookfrom is not None:
-            other["lookfrom"] = vec(lookfrom)
-        if lookat is not None:
-            other["lookat"] = vec(lookat)
-        return msgspec.structs.replace(self, **other)
+        return msgspec.structs.replace(self, **fields)
 
 
 def unit(v: np.ndarray) -> np.ndarray:
     """`v` at length 1, without overflow."""
     v = v / np.abs(v).max()
     return v / np.linalg.norm(v)
-
-
-def vec(v) -> Vec:
-    """Three Python floats."""
-    x, y, z = (float(part) for part in v)
-    return x, y, z
 
 
 def turn(v: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
@@ -126,10 +117,13 @@ def orbit(camera: Camera, right: float, up: float, pivot: Vec | None = None) -> 
     w = unit(np.subtract(camera.lookat, camera.lookfrom))
     polar = math.acos(min(max(float(-w @ pole), -1.0), 1.0))      # angle between the pole and the eye, seen from lookat
     limit = math.radians(1.0)
-    up = min(max(polar + up, min(limit, polar)), max(math.pi - limit, polar)) - polar
+    if up:
+        up = min(max(polar + up, limit), math.pi - limit) - polar
     left = unit(np.cross(pole, w))
+
     def carried(p):
-        return turn(turn(p - center, left, up), pole, -right) + center
+        return turn(turn(p - center, left, -up), pole, -right) + center
+
     return camera.at(lookfrom=carried(np.array(camera.lookfrom)), lookat=carried(np.array(camera.lookat)))
 
 
@@ -146,8 +140,10 @@ def dolly(camera: Camera, factor: float, toward: Vec | None = None) -> Camera:
     """The distance to `toward` (lookat unless given) multiplied by `factor`; lookat moves along, so what is under the
     cursor stays there."""
     center = np.array(camera.lookat if toward is None else toward)
+
     def nearer(p):
         return center + (np.array(p) - center) * factor
+
     return camera.at(lookfrom=nearer(camera.lookfrom), lookat=nearer(camera.lookat))
 
 
@@ -161,7 +157,8 @@ def fly(camera: Camera, right: float, up: float, forward: float) -> Camera:
 def frame(camera: Camera, low, high, aspect: float = 1.0) -> Camera:
     """The camera drawn back along its view until the box from `low` to `high` fills the picture, with a little air."""
     low, high = np.array(low, float), np.array(high, float)
-    center, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-9)
+    center = (low + high) / 2
+    radius = max(float(np.linalg.norm(high - low)) / 2, 1e-6 * float(np.abs(center).max()), 1e-9)
     half = math.radians(camera.fov) / 2
     half = min(half, math.atan(math.tan(half) * aspect))
     w = camera.basis()[2]

@@ -23,7 +23,8 @@ class Film(NamedTuple):
 def new_film(width: int, height: int) -> Film:
     """An empty film."""
     n = width * height
-    return Film(np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int32), np.full(n, -1, np.int32), np.full(n, np.inf, np.float32), np.zeros((n, 3), np.float32))
+    return Film(np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int32), np.full(n, -1, np.int32), np.full(n, np.inf, np.float32),
+                np.zeros((n, 3), np.float32))
 
 
 @kernel

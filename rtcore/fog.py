@@ -2,15 +2,12 @@
 import numpy as np
 
 from rtcore.jit import kernel
-from rtcore.scene import Fog
+from rtcore.scene import FOG_KINDS, Fog
 from rtcore.wave import DX, DY, DZ, T
-
-KINDS = ("linear", "exponential", "exponential-squared")
-
 
 def numbers(fog: Fog) -> np.ndarray:
     """What `dim` needs: kind, density, start, end, colour."""
-    return np.array([KINDS.index(fog.kind), fog.density, fog.start, fog.end, *fog.color])
+    return np.array([FOG_KINDS.index(fog.kind), fog.density, fog.start, fog.end, *fog.color])
 
 
 @kernel
@@ -19,7 +16,8 @@ def dim(wave, n, fog):
     kind, density, start, end = fog[0], fog[1], fog[2], fog[3]
     ray = wave.rays.ray
     for i in range(n):
-        s = np.float64(ray[T, i]) * np.sqrt(ray[DX, i] * np.float64(ray[DX, i]) + ray[DY, i] * np.float64(ray[DY, i]) + ray[DZ, i] * np.float64(ray[DZ, i]))
+        x, y, z = np.float64(ray[DX, i]), np.float64(ray[DY, i]), np.float64(ray[DZ, i])
+        s = np.float64(ray[T, i]) * np.sqrt(x * x + y * y + z * z)
         if kind == 0:
             f = min(max((end - s) / (end - start), 0.0), 1.0) if s < np.inf else 0.0
         elif density == 0:

@@ -258,7 +258,8 @@ def cross(tc, p, q):
     """p x q."""
     def gen(ctx, b, sig, a):
         u, v = _parts(ctx, b, p, a[0]), _parts(ctx, b, q, a[1])
-        return _vec3(ctx, b, p, [_math(b, "fma", u[(k + 1) % 3], v[(k + 2) % 3], b.fneg(b.fmul(u[(k + 2) % 3], v[(k + 1) % 3]))) for k in range(3)])
+        turns = ((1, 2), (2, 0), (0, 1))
+        return _vec3(ctx, b, p, [_math(b, "fma", u[j], v[k], b.fneg(b.fmul(u[k], v[j]))) for j, k in turns])
     return p(p, q), gen
 
 

@@ -54,7 +54,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
 
     given = STUDIO if scene.lights is None else scene.lights
     shining = [light for light in given if light.on and light.intensity > 0 and any(light.color)]
-    ambient = np.sum([np.multiply(l.color, l.intensity) for l in shining if isinstance(l, Ambient)] or [np.zeros(3)], axis=0)
+    everywhere = [np.multiply(light.color, light.intensity) for light in shining if isinstance(light, Ambient)]
+    ambient = np.sum(everywhere or [np.zeros(3)], axis=0)
     answers = any(m.diffuse > 0 or m.specular > 0 for m in materials)
     lights = tuple(light for light in shining if not isinstance(light, Ambient)) if answers else ()
     lit = VIEW[settings.view].needs_light
@@ -65,21 +66,24 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
         why = "none shines from a place or direction" if answers or not materials else "no visible material answers light"
         out.append(("lights", why if lit else NO_LIGHT))
     shadows = _keep(stages, out, "shadow rays", [(lit, NO_LIGHT), (settings.shadows, "switched off"), (lights, "no light to cast them")])
-    _keep(stages, out, "smooth normals", [(any(getattr(leaf.shape, "normals", None) is not None for leaf in visible), "every surface has its own")])
+    smooth = any(getattr(leaf.shape, "normals", None) is not None for leaf in visible)
+    _keep(stages, out, "smooth normals", [(smooth, "no mesh brings normals")])
     _keep(stages, out, "patterns", [(any(m.checker for m in materials), "no visible material has one")])
-    fog = _keep(stages, out, "fog", [(lit, NO_LIGHT), (scene.fog is not None, "the scene has none"), (scene.fog is not None and scene.fog.on and settings.fog, "switched off")])
+    fog = _keep(stages, out, "fog", [
+        (lit, NO_LIGHT), (scene.fog is not None, "the scene has none"),
+        (scene.fog is not None and scene.fog.on and settings.fog, "switched off")])
     bounces = _keep(stages, out, "reflected and refracted rays", [
         (lit, NO_LIGHT), (settings.reflections, "switched off"), (settings.max_depth > 1, "the depth is 1: eye rays only"),
         (any(m.reflection > 0 or m.transmission > 0 for m in materials), "no visible material reflects or transmits")])
-    _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1 or settings.seconds or settings.error, "one sample per pixel was asked for")])
+    _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1, "one sample per pixel was asked for")])
     stages.append("film")
     kinds = tuple(sorted(counts, key=lambda k: k.name))
     names = ["core", *(["tree"] if any(s.startswith("tree") for s in stages) else []), *(k.name for k in kinds),
-             *(f"light-{word}" for word in sorted({type(l).__name__.lower() for l in lights})), *(["lit"] if lights else []),
+             *(f"light-{word}" for word in sorted({type(light).__name__.lower() for light in lights})), *(["lit"] if lights else []),
              *(["fog"] if fog else []), *(["bounce"] if bounces else [])]
     assert all(type(light) in AIMS for light in lights)
-    return Plan(tuple(stages), tuple(out), tuple(f"{name}.{settings.precision}" for name in names), kinds, lights, ambient, shadows, bounces, fog,
-                settings.samples if lit else 1)
+    kernels = tuple(f"{name}.{settings.precision}" for name in names)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, settings.samples if lit else 1)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

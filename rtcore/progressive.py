@@ -6,6 +6,7 @@ with or without the coarse passes.
 """
 import itertools
 import os
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,10 +15,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+try:
+    import resource
+except ImportError:     # Windows
+    resource = None
+
 from rtcore import film as films
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
-from rtcore.plan import VIEW, Plan, plan
+from rtcore.plan import VIEW, plan
 from rtcore.scene import Scene
 from rtcore.settings import Settings
 from rtcore.trace import COUNTS, NONFINITE, Scratch, Tracer
@@ -76,7 +82,92 @@ def tiles(one: Pass, width: int, height: int) -> list[np.ndarray]:
     columns, rows = -(-width // one.spacing), -(-height // one.spacing)
     corners = [(x, y) for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
     corners.sort(key=lambda c: (c[0] + TILE / 2 - columns / 2) ** 2 + (c[1] + TILE / 2 - rows / 2) ** 2)
-    return [np.array([x, y, min(TILE, columns - x), min(TILE, rows - y), one.spacing, one.skip, width, height], np.int64) for x, y in corners]
+    rest = (one.spacing, one.skip, width, height)
+    return [np.array([x, y, min(TILE, columns - x), min(TILE, rows - y), *rest], np.int64) for x, y in corners]
+
+
+class Render:
+    """One request under way: its film, its scratch arrays, how far it is."""
+
+    def __init__(self, request: RenderRequest, geometry: Geometry, threads: int, coarse: bool):
+        scene, camera, self.settings = request
+        self.plan = plan(scene, self.settings, geometry.leaves)
+        width, height = self.settings.size
+        view = camera.rays(width, height)
+        self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
+        self.film = films.new_film(width, height)
+        self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
+        self.schedule = passes(self.plan.samples, coarse)
+        self.weights = [len(one.samples) * (0.75 if one.skip else 1.0) / one.spacing ** 2 for one in self.schedule]
+        self.prepared = time.perf_counter()
+        self.number = 0         # of the pass
+        self.samples = 0        # per pixel, complete
+        self.elapsed = 0.0
+        self.done_tiles = itertools.count(1)
+        self.progress = 0.0
+
+    def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[bool | None]:
+        """Trace the current pass on the pool; yields None now and then while it runs and, at the end, whether it was finished. Closing
+        the iterator, or an error in a thread, ends the threads' work first."""
+        one = self.schedule[self.number]
+        queue = tiles(one, *self.settings.size)
+        todo, halt = iter(queue), threading.Event()
+        # time runs out only once every pixel has a sample
+        deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
+        self.done_tiles = itertools.count(1)
+
+        def stale() -> bool:
+            return halt.is_set() or cancelled() or time.perf_counter() > deadline
+
+        shares = [pool.submit(self._work, scratch, one, todo, len(queue), stale) for scratch in self.scratches]
+        try:
+            while wait(shares, PARTIAL, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
+                self.elapsed = time.perf_counter() - self.prepared
+                yield None
+        finally:
+            if not all(share.done() for share in shares):
+                halt.set()
+            wait(shares)
+            self.elapsed = time.perf_counter() - self.prepared
+        finished = [share.result() for share in shares]     # an exception of a thread comes out here
+        if all(finished) and one.spacing == 1:
+            self.samples = one.samples.stop
+        yield all(finished)
+
+    def _work(self, scratch: Scratch, one: Pass, todo: Iterator, count: int, stale: Callable[[], bool]) -> bool:
+        """One thread's share of a pass: the next tile as long as there is one; False if it became stale."""
+        before, total = sum(self.weights[:self.number]), sum(self.weights)
+        for tile in todo:
+            for sample in one.samples:
+                if stale() or not self.tracer.tile(scratch, self.film, tile, sample, stale):
+                    return False
+            self.progress = (before + next(self.done_tiles) / count * self.weights[self.number]) / total
+        return True
+
+    def good_enough(self) -> bool:
+        """Whether the estimated error is as low as was asked for."""
+        estimate = films.rmse_estimate(self.film) if self.settings.error is not None else None
+        return estimate is not None and estimate <= self.settings.error
+
+    def counts(self) -> np.ndarray:
+        """What all threads have counted so far."""
+        return sum(scratch.counts for scratch in self.scratches)
+
+    def rays(self) -> dict[str, int]:
+        """Counts of rays under the names of the command line's --stats."""
+        counts = dict(zip(COUNTS, (int(c) for c in self.counts())))
+        return {key: counts[key] for key in ("primary", "primary_hits", "shadow", "shadow_hits", "reflection", "refraction")}
+
+    def frame(self, done: bool) -> Frame:
+        """The picture as it is now."""
+        width, height = self.settings.size
+        pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
+        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+        films.develop(self.film, width, height, COARSEST, pixels)
+        films.fill(self.film, width, height, COARSEST, node, distance, normal)
+        shown = VIEW[self.settings.view].draw(pixels, node, distance, normal)
+        return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
+                     self.rays(), self.elapsed, done)
 
 
 class Renderer:
@@ -87,14 +178,19 @@ class Renderer:
         self._scene: Scene | None = None
         self._pool: ThreadPoolExecutor | None = None
         self._threads = 0
-        self._stats: dict = {}
-        self.progress = 0.0     # of the current request, 0 .. 1; any thread may read it
+        self._render: Render | None = None
+        self._prepare = 0.0
 
     def close(self) -> None:
         """End the threads."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
+
+    @property
+    def progress(self) -> float:
+        """How far the current request is, 0 .. 1; any thread may ask."""
+        return self._render.progress if self._render is not None else 0.0
 
     def geometry(self, scene: Scene, precision: str) -> Geometry:
         """The scene's arrays, rebuilt only as far as it differs from the last one's."""
@@ -105,115 +201,51 @@ class Renderer:
 
     def frames(self, request: RenderRequest, cancelled: Callable[[], bool] = lambda: False, coarse: bool = True) -> Iterator[Frame]:
         """The pictures of a request, coarse ones first if wanted, the last one with `done`. Once `cancelled()` is true the running pass
-        ends within some milliseconds and the iterator ends; `stats()` then tells of what was rendered so far."""
+        ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far."""
         start = time.perf_counter()
-        self.progress = 0.0
-        scene, camera, settings = request
-        geometry = self.geometry(scene, settings.precision)
-        composed = plan(scene, settings, geometry.leaves)
-        width, height = settings.size
-        tracer = Tracer(geometry, composed, settings, camera.rays(width, height), camera.up, scene.background, scene.fog)
-        film = films.new_film(width, height)
-        threads = settings.threads or len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1))
+        threads = request.settings.threads or cores()
+        geometry = self.geometry(request.scene, request.settings.precision)
+        self._render = render = Render(request, geometry, threads, coarse)
         if self._pool is None or self._threads != threads:
             self.close()
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
-        scratches = [Scratch(geometry.dtype) for _ in range(threads)]
-        schedule = passes(composed.samples, coarse)
-        prepared = time.perf_counter()
-        self._stats = {"prepare": prepared - start, "plan": composed, "settings": settings, "threads": threads, "film": film, "trace": 0.0,
-                       "samples": 0, "counts": np.zeros(len(COUNTS), np.int64)}
-
-        def frame(number: int, samples: int, done: bool) -> Frame:
-            return self._frame(film, settings, number, len(schedule), schedule[number].spacing, samples, done)
-
-        budget = settings.seconds or np.inf
-        total = sum(len(one.samples) * _share(one) for one in schedule)
-        before = 0.0
-        for number, one in enumerate(schedule):
-            queue = tiles(one, width, height)
-            todo, done_tiles = iter(queue), itertools.count(1)
-            halt = threading.Event()
-            complete = number >= (COARSEST.bit_length() if coarse else 1)       # every pixel has its first sample
-
-            def stale() -> bool:
-                return halt.is_set() or cancelled() or (complete and time.perf_counter() - prepared > budget)
-
-            def work(scratch: Scratch) -> bool:
-                for tile in todo:
-                    for sample in one.samples:
-                        if stale() or not tracer.tile(scratch, film, tile, sample, stale):
-                            return False
-                    self.progress = (before + next(done_tiles) / len(queue) * len(one.samples) * _share(one)) / total
-                return True
-
-            shares = [self._pool.submit(work, scratch) for scratch in scratches]
-            try:
-                while wait(shares, PARTIAL, FIRST_EXCEPTION).not_done and not any(f.done() and f.exception() for f in shares):
-                    self._tally(scratches, prepared)
-                    if not cancelled():
-                        yield frame(number, one.samples.start, False)
-            finally:    # an exception here or in a thread, or a consumer that has had enough
-                if not all(f.done() for f in shares):
-                    halt.set()
-                wait(shares)
-            self._tally(scratches, prepared)
-            finished = all([f.result() for f in shares])
-            before += len(one.samples) * _share(one)
-            if finished and one.spacing == 1:
-                self._stats["samples"] = one.samples.stop
-            enough = not finished or (settings.error is not None and one.samples.stop > 1 and (films.rmse_estimate(film) or np.inf) <= settings.error)
+        self._prepare = render.prepared - start
+        for number in range(len(render.schedule)):
+            render.number = number
+            for finished in render.trace(self._pool, cancelled):
+                if finished is None and not cancelled():
+                    yield render.frame(False)
             if cancelled():
                 return
-            last = enough or number == len(schedule) - 1
-            if last:
-                self.progress = 1.0
-            yield frame(number, self._stats["samples"], last)
-            if last:
+            done = not finished or render.good_enough() or number == len(render.schedule) - 1
+            if done:
+                render.progress = 1.0
+            yield render.frame(done)
+            if done:
                 return
-
-    def _tally(self, scratches: list[Scratch], since: float) -> None:
-        self._stats["trace"] = time.perf_counter() - since
-        self._stats["counts"] = sum(s.counts for s in scratches)
-
-    def _frame(self, film, settings: Settings, number: int, count: int, spacing: int, samples: int, done: bool) -> Frame:
-        width, height = settings.size
-        pixels = np.empty((height, width, 3), np.float32)
-        node, distance, normal = np.empty((height, width), np.int32), np.empty((height, width), np.float32), np.empty((height, width, 3), np.float32)
-        films.develop(film, width, height, COARSEST, pixels)
-        films.fill(film, width, height, COARSEST, node, distance, normal)
-        shown = VIEW[settings.view].draw(pixels, node, distance, normal)
-        return Frame(number, count, spacing, samples, shown, node, distance, self._rays(), self._stats["trace"], done)
-
-    def _rays(self) -> dict[str, int]:
-        counts = dict(zip(COUNTS, (int(c) for c in self._stats["counts"])))
-        return {key: counts[key] for key in ("primary", "primary_hits", "shadow", "shadow_hits", "reflection", "refraction")}
 
     def picture(self) -> np.ndarray:
         """What the last request has come to so far, linear (h, w, 3) float32."""
-        return self._frame(self._stats["film"], self._stats["settings"], 0, 1, 1, 0, True).pixels
+        return self._render.frame(True).pixels
 
     def stats(self) -> dict:
         """The last request in the form of the command line's --stats, without what only the caller knows."""
-        s, composed = self._stats, self._stats["plan"]
-        per_pixel = int(s["film"].count.min())
-        return {"size": list(s["settings"].size), "samples_per_pixel": per_pixel, "precision": s["settings"].precision, "threads": s["threads"],
-                "rays": self._rays(), "seconds": {"prepare": s["prepare"], "trace": s["trace"]}, "peak_memory_mib": peak_memory_mib(),
-                "nonfinite_pixels": int(s["counts"][NONFINITE]), "stages": list(composed.stages),
-                "left_out": [{"stage": stage, "why": why} for stage, why in composed.left_out],
-                "error": {"rmse_estimate": films.rmse_estimate(s["film"])}}
+        render = self._render
+        settings = render.settings
+        return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
+                "threads": self._threads, "rays": render.rays(), "seconds": {"prepare": self._prepare, "trace": render.elapsed},
+                "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
+                "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in render.plan.left_out],
+                "error": {"rmse_estimate": films.rmse_estimate(render.film)}}
 
 
-def _share(one: Pass) -> float:
-    """The part of the picture's pixels that a pass traces per sample."""
-    return (0.75 if one.skip else 1.0) / one.spacing ** 2
+def cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def peak_memory_mib() -> float | None:
     """The most memory this process ever held, in MiB; None where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
+    if resource is None:
         return None
-    import sys
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10)

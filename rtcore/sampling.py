@@ -18,7 +18,8 @@ def hash32(x):
 
 @inline
 def jitter(pixel, sample, seed):
-    """Offset (x, y) in 0 .. 1 of a sample in its pixel. Sample 0 is the pixel's centre; the others follow R2 from a start of the pixel's own."""
+    """Offset (x, y) in 0 .. 1 of a sample in its pixel. Sample 0 is the pixel's centre; the others follow R2 from a start
+    of the pixel's own."""
     if sample == 0:
         return 0.5, 0.5
     key = hash32(pixel * 2 + 1) ^ hash32(seed + 0x9E37)

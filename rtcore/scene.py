@@ -20,7 +20,7 @@ MOST_LEAVES = 4_000_000  # shapes after every use of a definition is counted
 class Shape(Record, frozen=True, kw_only=True):
     """What every shape has besides its own fields. Its module in `rtcore.shapes` holds the rest."""
 
-    sides: Annotated[str, Choice(words=("both", "front", "back"), help="which sides are visible; the front is where the normal points")] = "both"
+    sides: Annotated[str, Choice(words=("both", "front", "back"), help="which sides are visible; the normal points to the front")] = "both"
 
     def count(self) -> int:
         """How many primitives the shape becomes."""
@@ -67,13 +67,16 @@ class Material(Record, frozen=True, kw_only=True):
     note: Annotated[str, Text(help="a remark of the author")] = ""
 
 
+FOG_KINDS = ("linear", "exponential", "exponential-squared")
+
+
 class Fog(Record, frozen=True, kw_only=True):
     """Fog between two points a distance s apart lets through f of the light and adds (1 - f) of its colour.
 
     linear: f = (end - s)/(end - start), exponential: f = exp(-density·s), exponential-squared: f = exp(-(density·s)²).
     """
 
-    kind: Annotated[str, Choice(words=("linear", "exponential", "exponential-squared"), help="how the fog grows with distance")] = "exponential"
+    kind: Annotated[str, Choice(words=FOG_KINDS, help="how the fog grows with distance")] = "exponential"
     color: Annotated[Vec, Color(help="colour of the fog")] = (0.7, 0.75, 0.8)
     density: Annotated[float, Number(least=0, help="of the exponential kinds", unit="1/scene unit")] = 0.1
     start: Annotated[float, Number(least=0, help="where linear fog begins", unit="scene units")] = 0.0
@@ -214,8 +217,9 @@ class Node(Record, frozen=True, kw_only=True):
     note: Annotated[str, Text(help="a remark of the author")] = ""
 
     def check(self):
-        if sum(x is not None for x in (self.shape, self.children, self.use)) != 1:
-            raise FieldError("exactly one of a shape, a group or a use", [n for n in ("shape", "children", "use") if getattr(self, n) is not None])
+        given = [word for word in ("shape", "children", "use") if getattr(self, word) is not None]
+        if len(given) != 1:
+            raise FieldError("exactly one of a shape, a group or a use", given)
         if self.shape is not None and not isinstance(self.shape, Shape):
             raise FieldError("a shape", self.shape, "shape")
         if self.children is not None:
@@ -276,9 +280,9 @@ class Scene(Record, frozen=True, kw_only=True):
         msgspec.structs.force_setattr(self, "objects", as_nodes(self.objects, "objects"))
         if self.lights is not None:
             msgspec.structs.force_setattr(self, "lights", tuple(self.lights))
-        for kind, value, types in (("camera", self.camera, (Camera, type(None))), ("fog", self.fog, (Fog, type(None))), ("background", self.background, Background)):
-            if not isinstance(value, types):
-                raise FieldError(f"a {kind}", value, kind)
+        for name, types in (("camera", (Camera, type(None))), ("fog", (Fog, type(None))), ("background", Background)):
+            if not isinstance(getattr(self, name), types):
+                raise FieldError(f"a {name}", getattr(self, name), name)
         for i, light in enumerate(self.lights or ()):
             if not isinstance(light, Light):
                 raise FieldError("a light", light, f"lights[{i}]")
@@ -292,18 +296,20 @@ class Scene(Record, frozen=True, kw_only=True):
             if depth > MOST_NESTED:
                 raise FieldError(f"at most {MOST_NESTED} groups inside one another", depth, path)
             if isinstance(node.material, str) and node.material not in self.materials:
-                raise FieldError("the name of a material: " + (", ".join(sorted(self.materials)) or "there are none"), node.material, f"{path}.material")
+                raise FieldError(one_of("material", self.materials), node.material, f"{path}.material")
             if node.use is not None:
                 if node.use not in self.definitions:
-                    raise FieldError("the name of a definition: " + (", ".join(sorted(self.definitions)) or "there are none"), node.use, f"{path}.use")
+                    raise FieldError(one_of("definition", self.definitions), node.use, f"{path}.use")
                 if node.use in open_:
-                    raise FieldError("definitions that do not use themselves", " -> ".join((*open_[open_.index(node.use):], node.use)), f"{path}.use")
+                    circle = " -> ".join((*open_[open_.index(node.use):], node.use))
+                    raise FieldError("definitions that do not use themselves", circle, f"{path}.use")
                 if node.use not in leaves:
                     leaves[node.use] = measure(self.definitions[node.use], f"definitions.{node.use}", (*open_, node.use), depth + 1)
                 count, levels = leaves[node.use]
             elif node.children is not None:
                 below = [measure(c, f"{path}.group[{i}]", open_, depth + 1) for i, c in enumerate(node.children)]
-                count, levels = sum(b[0] for b in below), max((b[1] for b in below), default=0)
+                # an empty group counts as well: a walk has to look at each of its uses
+                count, levels = max(sum(b[0] for b in below), 1), max((b[1] for b in below), default=0)
             else:
                 count, levels = 1, 0
             if count > MOST_LEAVES:
@@ -338,6 +344,11 @@ class Scene(Record, frozen=True, kw_only=True):
 
         for i, node in enumerate(self.objects):
             yield from walk(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
+
+
+def one_of(what: str, names) -> str:
+    """What an error says that expected one of these names."""
+    return f"the name of a {what}: " + (", ".join(sorted(names)) or "there are none")
 
 
 DEFAULT_MATERIAL = Material()

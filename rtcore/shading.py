@@ -141,7 +141,8 @@ def light_up(wave, n, look, color, beam):
         beam.bring[2, count] = strength * color[2] * (b * diffuse * cosine + highlight)
         beam.owner[count] = i
         err = surface[ERR, i]
-        put_ray(beam.rays, count, surface[PX, i] + err * gx, surface[PY, i] + err * gy, surface[PZ, i] + err * gz, x, y, z, aim[AIM_REACH, i])
+        put_ray(beam.rays, count, surface[PX, i] + err * gx, surface[PY, i] + err * gy, surface[PZ, i] + err * gz, x, y, z,
+                aim[AIM_REACH, i])
         count += 1
     finish(beam.rays, count)
     return count

@@ -24,7 +24,7 @@ LAYERS = (
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
     {"rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},
-    {"rtcore.reports"},
+    {"rtcore.api", "rtcore.reports"},
     {"rtcore"},
 )
 FAMILIES = ("rtcore.shapes", "rtcore.lights", "rtcore.files", "rtcore.views")

@@ -10,9 +10,9 @@ import numpy as np
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import FieldError, Flag, Number, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import along, dot, least, load, load3, root, select, splat3, vec3, with_sign
+from rtcore.lanes import along, dot, load, load3, root, select, splat3, vec3, with_sign
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
 
 BASE, SLOPE, CAPPED = OWN, OWN + 1, OWN + 2

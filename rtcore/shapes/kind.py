@@ -104,11 +104,30 @@ def into1(data, p, x, y, z):
 
 
 @inline
+def hit_from(rays, i, x, y, z):
+    """The hit of ray i seen from (x, y, z), as three float64."""
+    ray = rays.ray
+    t = np.float64(ray[T, i])
+    return ray[OX, i] + t * ray[DX, i] - x, ray[OX + 1, i] + t * ray[DX + 1, i] - y, ray[OX + 2, i] + t * ray[DX + 2, i] - z
+
+
+@inline
 def unit_hit(rays, i, data, p):
     """Where ray i meets placed primitive p, in its unit space: three float64."""
-    t = np.float64(rays.ray[T, i])
-    return into1(data, p, rays.ray[OX, i] + t * rays.ray[DX, i] - data[p, 0], rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - data[p, 1],
-                 rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - data[p, 2])
+    return into1(data, p, *hit_from(rays, i, data[p, 0], data[p, 1], data[p, 2]))
+
+
+@inline
+def put_flat(rays, i, out, data, p, column):
+    """Surface rows of a hit on the plane through data[p, 0..2] with normal data[p, column..]; texture coordinates along the two axes
+    that the normal points at least."""
+    cx, cy, cz = np.float64(data[p, 0]), np.float64(data[p, 1]), np.float64(data[p, 2])
+    nx, ny, nz = normalized(np.float64(data[p, column]), np.float64(data[p, column + 1]), np.float64(data[p, column + 2]))
+    x, y, z = hit_from(rays, i, cx, cy, cz)
+    height = x * nx + y * ny + z * nz
+    x, y, z = x - height * nx, y - height * ny, z - height * nz
+    u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
+    put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))))
 
 
 @inline

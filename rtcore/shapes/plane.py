@@ -7,8 +7,8 @@ from rtcore.fields import Vec, Vector
 from rtcore.jit import kernel
 from rtcore.lanes import dot, load3, splat3
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, normalized, put_surface
-from rtcore.wave import DX, OX, T, record
+from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, put_flat
+from rtcore.wave import DX, OX, record
 
 
 class Plane(Shape, frozen=True):
@@ -46,15 +46,7 @@ def surface(rays, n, out, table, first):
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
-            t = np.float64(rays.ray[T, i])
-            cx, cy, cz = table.data[q, 0], table.data[q, 1], table.data[q, 2]
-            nx, ny, nz = normalized(table.data[q, 3], table.data[q, 4], table.data[q, 5])
-            x, y, z = rays.ray[OX, i] + t * rays.ray[DX, i] - cx, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - cy, rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - cz
-            height = x * nx + y * ny + z * nz
-            x, y, z = x - height * nx, y - height * ny, z - height * nz
-            # texture coordinates along the two axes that the normal points at least
-            u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
-            put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))))
+            put_flat(rays, i, out, table.data, q, 3)
 
 
 PLANE = Kind("plane", intersect, surface, None, (Plane((0, 0, 0), (0, 1, 0)), ()))

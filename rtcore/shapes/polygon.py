@@ -8,7 +8,7 @@ from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.jit import inline, kernel
 from rtcore.lanes import bits, dot, load, load3, splat3
 from rtcore.scene import Shape
-from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, normalized, put_surface
+from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, put_flat
 from rtcore.wave import DX, OX, START, T, record
 
 NORMAL, DROP, FIRST, COUNT = 3, 6, 7, 8     # columns after the first vertex
@@ -102,15 +102,7 @@ def surface(rays, n, out, table, first):
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
-            t = np.float64(rays.ray[T, i])
-            cx, cy, cz = table.data[q, 0], table.data[q, 1], table.data[q, 2]
-            nx, ny, nz = normalized(table.data[q, NORMAL], table.data[q, NORMAL + 1], table.data[q, NORMAL + 2])
-            x, y, z = rays.ray[OX, i] + t * rays.ray[DX, i] - cx, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - cy, rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - cz
-            height = x * nx + y * ny + z * nz
-            x, y, z = x - height * nx, y - height * ny, z - height * nz
-            drop = int(table.data[q, DROP])
-            u, v = (y, z) if drop == 0 else (z, x) if drop == 1 else (x, y)
-            put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))))
+            put_flat(rays, i, out, table.data, q, NORMAL)
 
 
 def _bounds(data, extra):

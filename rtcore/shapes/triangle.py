@@ -12,8 +12,8 @@ from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
 from rtcore.jit import inline, kernel
 from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, normalized, put_surface
-from rtcore.wave import DX, NX, NY, NZ, OX, T, record
+from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, hit_from, normalized, put_surface
+from rtcore.wave import DX, NX, NY, NZ, OX, record
 
 
 class Triangle(Shape, frozen=True):
@@ -32,7 +32,8 @@ class Triangle(Shape, frozen=True):
         return TRIANGLE
 
     def pack(self, matrix: np.ndarray) -> Packed:
-        return pack_triangles(np.array([[self.a, self.b, self.c]]), None if self.normals is None else np.array([self.normals]), matrix)
+        normals = None if self.normals is None else np.array([self.normals])
+        return pack_triangles(np.array([[self.a, self.b, self.c]]), normals, matrix)
 
 
 class Array(Field):
@@ -82,7 +83,8 @@ class Mesh(Shape, frozen=True, eq=False):
             raise FieldError("at least one face", 0, "faces")
         over = np.flatnonzero((self.faces >= len(self.vertices)).any(axis=1))
         if len(over):
-            raise FieldError(f"indices less than the number of vertices, {len(self.vertices)}", self.faces[over[0]].tolist(), f"faces[{over[0]}]")
+            expected = f"indices less than the number of vertices, {len(self.vertices)}"
+            raise FieldError(expected, self.faces[over[0]].tolist(), f"faces[{over[0]}]")
         if self.normals is not None and len(self.normals) != len(self.vertices):
             raise FieldError(f"as many normals as vertices, {len(self.vertices)}", len(self.normals), "normals")
 
@@ -96,9 +98,10 @@ class Mesh(Shape, frozen=True, eq=False):
         return len(self.faces)
 
     def __eq__(self, other):
-        return (isinstance(other, Mesh) and self.sides == other.sides and self.file == other.file
-                and np.array_equal(self.vertices, other.vertices) and np.array_equal(self.faces, other.faces)
-                and (self.normals is other.normals or (self.normals is not None and other.normals is not None and np.array_equal(self.normals, other.normals))))
+        if not isinstance(other, Mesh) or (self.sides, self.file, self.normals is None) != (other.sides, other.file, other.normals is None):
+            return False
+        pairs = [(self.vertices, other.vertices), (self.faces, other.faces), (self.normals, other.normals)]
+        return all(a is b or np.array_equal(a, b) for a, b in pairs)
 
     def __hash__(self):
         return id(self)
@@ -198,11 +201,10 @@ def surface(rays, n, out, table, first):
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
-            t = np.float64(rays.ray[T, i])
             ax, ay, az = np.float64(data[q, 0]), np.float64(data[q, 1]), np.float64(data[q, 2])
             ex, ey, ez = data[q, 3] - ax, data[q, 4] - ay, data[q, 5] - az
             fx, fy, fz = data[q, 6] - ax, data[q, 7] - ay, data[q, 8] - az
-            sx, sy, sz = rays.ray[OX, i] + t * rays.ray[DX, i] - ax, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - ay, rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - az
+            sx, sy, sz = hit_from(rays, i, ax, ay, az)
             longest = max(max(abs(ex), max(abs(ey), abs(ez))), max(abs(fx), max(abs(fy), abs(fz))))
             ex, ey, ez, fx, fy, fz = ex / longest, ey / longest, ez / longest, fx / longest, fy / longest, fz / longest
             sx, sy, sz = sx / longest, sy / longest, sz / longest
