@@ -20,7 +20,8 @@ ACTIONS = (
     Action("reload", "&Reload", "reload", "F5", "Read the file again and keep the view", lambda w: w.reload()),
     Action("save", "&Save", "save", "Ctrl+S", "Save the scene with the camera as it is now", lambda w: w.save()),
     Action("save_as", "Save &as…", "", "Ctrl+Shift+S", "Save the scene under another name", lambda w: w.save_as()),
-    Action("save_picture", "Save &picture…", "picture", "Ctrl+E", "Save the picture as PNG, or as EXR in linear light", lambda w: w.save_picture()),
+    Action("save_picture", "Save &picture…", "picture", "Ctrl+E", "Save the picture as PNG, or as EXR in linear light",
+           lambda w: w.save_picture()),
     Action("quit", "&Quit", "", "Ctrl+Q", "Close the window", lambda w: w.close()),
 
     Action("undo", "&Undo", "undo", "Ctrl+Z", "Take back the last change of the scene", lambda w: w.session.document.undo()),
@@ -32,12 +33,14 @@ ACTIONS = (
            lambda w: w.session.frame_selection()),
     Action("frame_all", "Frame &all", "home", "Home", "Draw back until everything is in the picture", lambda w: w.session.frame_all()),
     Action("reset_view", "&Reset view", "reset", "Ctrl+Home", "The camera that the file came with", lambda w: w.session.reset_view()),
-    Action("shadows", "S&hadows", "shadows", "1", "Let things stand in one another's light", lambda w, on: w.session.switch("shadows", on), True),
+    Action("shadows", "S&hadows", "shadows", "1", "Let things stand in one another's light",
+           lambda w, on: w.session.switch("shadows", on), True),
     Action("fog", "&Fog", "fog", "2", "Show the scene's fog", lambda w, on: w.switch_fog(on), True),
     Action("reflections", "R&eflections", "reflections", "3", "Follow mirrored and refracted light",
            lambda w, on: w.session.switch("reflections", on), True),
     Action("panels", "&Panels", "panels", "Ctrl+.", "Show the panels, or only the picture", lambda w, on: w.show_panels(on), True),
-    Action("fullscreen", "F&ull screen", "fullscreen", "F11", "Fill the screen with the picture, for the projector", lambda w, on: w.fill_screen(on), True),
+    Action("fullscreen", "F&ull screen", "fullscreen", "F11", "Fill the screen with the picture, for the projector",
+           lambda w, on: w.fill_screen(on), True),
     Action("arrange", "Reset the &layout", "", "", "Put the panels where they were in the beginning", lambda w: w.arrange()),
 
     Action("shortcuts", "&Keyboard and mouse", "keyboard", "F1", "What keys and mouse do", lambda w: w.show_shortcuts()),
@@ -53,13 +56,14 @@ MENUS = (
     ("&Help", ("shortcuts", "about")),
 )
 
-TOOLBAR = ("open", "<gallery>", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection", "frame_all",
-           "reset_view", None, "shadows", "fog", "reflections", "<space>", "panels", "fullscreen", "shortcuts")
+TOOLBAR = ("open", "<gallery>", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection",
+           "frame_all", "reset_view", None, "shadows", "fog", "reflections", "<space>", "panels", "fullscreen", "shortcuts")
 
 #: Shown with their names in the toolbar, because a symbol alone would not tell.
 WORDED = ("shadows", "fog", "reflections")
 
 #: What the mouse and the fly keys do in the picture, for the shortcuts' dialog.
-MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"), ("Wheel, right drag", "nearer or farther; the wheel toward the cursor"),
-         ("Click", "select what is seen there"), ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "select nothing"),
+MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"),
+         ("Wheel, right drag", "nearer or farther; the wheel toward the cursor"), ("Click", "select what is seen there"),
+         ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "select nothing"),
          ("Up, Down in a number", "step it; Page Up and Page Down by ten"))

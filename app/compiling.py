@@ -19,7 +19,8 @@ class Compiling(NamedTuple):
     name: str
 
     def __str__(self) -> str:
-        return f"Compiling {min(self.done + 1, self.total)} of {self.total}: {self.name} (first run only)"
+        name = self.name.partition(".")[0]      # without the float type
+        return f"Compiling {min(self.done + 1, self.total)} of {self.total}: {name} (first run only)"
 
 
 class Compiler:

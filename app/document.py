@@ -87,6 +87,6 @@ class Document(QObject):
 
     def _go(self, step: int):
         if step:
-            self.seal()
             self._at += step
+            self.seal()
             self.changed.emit()

@@ -72,10 +72,8 @@ class GridEdit(Editor):
         return self._entries
 
     def show_value(self, value):
-        if len(self._entries) == 1 and self._flat:
-            values = [value]
-        else:
-            values = list(value) if self._flat else [x for row in value for x in row]
+        one = len(self._entries) == 1 and self._flat
+        values = [value] if one else list(value) if self._flat else [x for row in value for x in row]
         for i, (entry, number) in enumerate(zip(self._entries, values)):
             self._values[i] = number
             entry.show_text(number_text(number))
@@ -292,7 +290,7 @@ class ChoiceEdit(Editor):
         self._combo.setMinimumContentsLength(6)
         self._combo.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for word in words:
-            self._combo.addItem(word.replace("-", " ").capitalize() if word.islower() and not any(c.isdigit() for c in word) else word, word)
+            self._combo.addItem(word.replace("-", " ").capitalize() if word.replace("-", "").isalpha() else word, word)
         self._row.addWidget(self._combo)
         self.setFocusProxy(self._combo)
         self._combo.activated.connect(lambda i: self.edited.emit(self._combo.itemData(i), False))
@@ -313,7 +311,7 @@ class TextEdit(Editor):
         self._entry = Entry(self)
         self._row.addWidget(self._entry)
         self.setFocusProxy(self._entry)
-        self._entry.textEdited.connect(self.tried)
+        self._entry.textEdited.connect(lambda text: self.tried.emit(text))
         self._entry.meant.connect(self._meant)
 
     @property

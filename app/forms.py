@@ -77,7 +77,8 @@ class Form(QWidget):
         label.setBuddy(editor.focusProxy() or editor)
         editor.describe(title, tip)
         row = self._grid.rowCount()
-        self._grid.addWidget(label, row, 0, Qt.AlignmentFlag.AlignTop if isinstance(editor, GridEdit) and len(editor.entries) > 4 else Qt.AlignmentFlag.AlignVCenter)
+        high = isinstance(editor, GridEdit) and len(editor.entries) > 4
+        self._grid.addWidget(label, row, 0, Qt.AlignmentFlag.AlignTop if high else Qt.AlignmentFlag.AlignVCenter)
         self._grid.addWidget(editor, row, 1)
         self.editors[name], self._labels[name] = editor, label
         self.bindings[name] = Binding(editor, read, make, commit, seal)
@@ -102,15 +103,16 @@ class RecordForm(Form):
     """The fields of one record. `read` gives the record as it is now, `commit(record, label, merge)` takes the changed one."""
 
     def __init__(self, read: Callable[[], Record], commit: Callable[[Record, str, object], None], seal: Callable[[], None],
-                 only: tuple[str, ...] | None = None, skip: tuple[str, ...] = (), editors: dict[str, Editor] | None = None, parent: QWidget | None = None):
-        super().__init__(parent)
+                 only: tuple[str, ...] | None = None, skip: tuple[str, ...] = (), editors: dict[str, Editor] | None = None):
+        super().__init__()
         record = read()
         for name, field in fields_of(type(record)).items():
             if (only is not None and name not in only) or name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color)):
                 continue
             value = getattr(record, name)
             editor = (editors or {}).get(name) or editor_for(field, value)
-            self.add(name, editor, tip_of(field), lambda name=name: getattr(read(), name), lambda value, name=name: changed(read(), name, value),
+            self.add(name, editor, tip_of(field), lambda name=name: getattr(read(), name),
+                     lambda value, name=name: changed(read(), name, value),
                      lambda made, merge, name=name: commit(made, title_of(name).lower(), merge), seal)
 
 

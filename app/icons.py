@@ -25,14 +25,15 @@ def render(name: str, color: str, side: int) -> QPixmap:
 
 
 @lru_cache(maxsize=256)
-def icon(name: str, theme: Theme) -> QIcon:
-    """The icon in all states: plain, faint while disabled, in the accent while checked."""
+def icon(name: str, theme: Theme, switch: bool = True) -> QIcon:
+    """The icon in all states: plain, faint while disabled, and for a ``switch`` in the accent while it is on."""
     result = QIcon()
     ratio = QGuiApplication.instance().devicePixelRatio()
     for side in sorted({round(side * scale) for side in SIDES for scale in (1, ratio)}):
-        for color, mode, state in ((theme.icon, QIcon.Mode.Normal, QIcon.State.Off), (theme.accent, QIcon.Mode.Normal, QIcon.State.On),
-                                   (theme.faint, QIcon.Mode.Disabled, QIcon.State.Off)):
-            result.addPixmap(render(name, color, side), mode, state)
+        result.addPixmap(render(name, theme.icon, side))
+        result.addPixmap(render(name, theme.faint, side), QIcon.Mode.Disabled)
+        if switch:
+            result.addPixmap(render(name, theme.accent, side), QIcon.Mode.Normal, QIcon.State.On)
     return result
 
 

@@ -70,7 +70,7 @@ class Notice(QFrame):
         room = self.parentWidget().width() - 24
         wanted = self.label.fontMetrics().horizontalAdvance(self.label.text()) + 110
         width = min(max(wanted, 280), room)
-        self.setGeometry((room + 24 - width) // 2, 12, width, self.heightForWidth(width) if self.hasHeightForWidth() else self.sizeHint().height())
+        self.setGeometry((room + 24 - width) // 2, 12, width, self.heightForWidth(width))
 
 
 class Busy(QFrame):
@@ -129,4 +129,5 @@ class Busy(QFrame):
     def _place(self):
         room, height = self.parentWidget().width(), self.sizeHint().height()
         width = min(max(self.label.sizeHint().width() + 40, 380), room - 24)
-        self.setGeometry((room - width) // 2, self.parentWidget().height() - height - 24, width, height)
+        below = self.parentWidget().height() - height
+        self.setGeometry((room - width) // 2, below - 24 if self._session.shown else below // 2, width, height)

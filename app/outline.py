@@ -1,4 +1,4 @@
-"""The outline of a selection: a coloured ring around the pixels of its leaves, with a dark halo that keeps it readable on any picture."""
+"""The outline of a selection: a coloured ring around the pixels of its leaves, with a dark halo that sets it off from any picture."""
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +38,7 @@ def trace_outline(node: np.ndarray, span: tuple[int, int], width: int = 2) -> Ou
         halo = grown(halo, corners=step % 2 == 0)
     kinds = halo.astype(np.uint8) + ring
     kinds[inside] = 0
+    kinds[inside & grown(~inside, corners=False)] = 1       # a thin halo on the inner side as well
     height, wide = node.shape
     y0, x0, y1, x1 = max(top, 0), max(left, 0), min(top + len(kinds), height), min(left + kinds.shape[1], wide)
     return Outline(int(x0), int(y0), COLORS[kinds[y0 - top:y1 - top, x0 - left:x1 - left]])

@@ -101,7 +101,8 @@ def with_node(scene: Scene, path: Path, new: Node) -> Scene:
         return msgspec.structs.replace(node, children=spliced(node.children, rest[0], rebuilt(node.children[rest[0]], rest[1:])))
 
     if definition is not None:
-        return msgspec.structs.replace(scene, definitions={**scene.definitions, definition: rebuilt(scene.definitions[definition], path[start:])})
+        node = rebuilt(scene.definitions[definition], path[start:])
+        return msgspec.structs.replace(scene, definitions={**scene.definitions, definition: node})
     return msgspec.structs.replace(scene, objects=spliced(scene.objects, path[0], rebuilt(scene.objects[path[0]], path[1:])))
 
 

@@ -138,9 +138,10 @@ class Session(QObject):
         if self.camera is None:
             return
         try:
-            camera = how(self.camera, *amounts)
+            with np.errstate(all="ignore"):
+                camera = how(self.camera, *amounts)
         except FieldError:
-            return      # at the edge of what a camera can be (a dolly of 1e300): the view stays
+            return      # at the edge of what a camera can be (a dolly to 1e308): the view stays
         self.move(camera, gesture)
 
     def back(self):

@@ -28,7 +28,8 @@ class Tasks(QObject):
         self._closed = False
         self._ended.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
 
-    def run(self, work: Callable[[], object], done: Callable[[object], None], failed: Callable[[Exception], None] | None = None, name: str = "task"):
+    def run(self, work: Callable[[], object], done: Callable[[object], None], failed: Callable[[Exception], None] | None = None,
+            name: str = "task"):
         """Call `work()` on a thread, then `done(result)`, or `failed(error)`, here."""
         def body():
             try:

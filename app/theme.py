@@ -33,9 +33,9 @@ class Theme(NamedTuple):
 DARK = Theme("dark", window="#1b1d21", panel="#22252a", field="#17191d", raised="#2e3238", hover="#383d45", line="#363b43", text="#e4e7eb",
              muted="#9ba3ae", faint="#5d646e", icon="#c3c9d2", accent="#f2a33a", on_accent="#1d1404", soft="#4a3a20", error="#ff7b72",
              error_soft="#40211f", stage="#121316")
-LIGHT = Theme("light", window="#e9ebee", panel="#f6f7f9", field="#ffffff", raised="#ffffff", hover="#eceef2", line="#cdd2d9", text="#1e2228",
-              muted="#5c6570", faint="#a4abb5", icon="#454c56", accent="#b45f06", on_accent="#ffffff", soft="#f8e3c8", error="#c3271b",
-              error_soft="#fdeae8", stage="#d5d9de")
+LIGHT = Theme("light", window="#e9ebee", panel="#f6f7f9", field="#ffffff", raised="#ffffff", hover="#eceef2", line="#cdd2d9",
+              text="#1e2228", muted="#5c6570", faint="#a4abb5", icon="#454c56", accent="#b45f06", on_accent="#ffffff", soft="#f8e3c8",
+              error="#c3271b", error_soft="#fdeae8", stage="#d5d9de")
 CHOICES = ("system", "light", "dark")
 
 SHEET = """
@@ -80,7 +80,9 @@ QScrollBar::handle:hover { background: %(faint)s; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 
-QTreeView { background: %(panel)s; border: none; outline: none; padding: 4px 2px; }
+QTreeView { background: %(panel)s; border: none; outline: none; padding: 4px 2px; show-decoration-selected: 0;
+    selection-background-color: transparent; }
+QTreeView::branch:selected { background: transparent; }
 QTreeView::item { min-height: 23px; border-radius: 4px; color: %(text)s; padding-left: 1px; }
 QTreeView::item:hover { background: %(hover)s; }
 QTreeView::item:selected { background: %(soft)s; color: %(text)s; }
@@ -88,7 +90,7 @@ QTreeView::branch { background: transparent; }
 QTreeView::branch:has-children:closed { image: url(%(icons)s/chevron-right.svg); }
 QTreeView::branch:has-children:open { image: url(%(icons)s/chevron-down.svg); }
 
-QLineEdit, QComboBox { background: %(field)s; border: 1px solid %(line)s; border-radius: 4px; padding: 3px 6px; color: %(text)s;
+QLineEdit, QComboBox { background: %(field)s; border: 1px solid %(line)s; border-radius: 4px; padding: 3px 5px; color: %(text)s;
     selection-background-color: %(accent)s; selection-color: %(on_accent)s; min-height: 17px; }
 QLineEdit:hover, QComboBox:hover { border-color: %(faint)s; }
 QLineEdit:focus, QComboBox:focus { border-color: %(accent)s; }
@@ -99,7 +101,8 @@ QComboBox::drop-down { border: none; width: 20px; }
 QComboBox::down-arrow { image: url(%(icons)s/chevron-down.svg); width: 16px; height: 16px; }
 QComboBox QAbstractItemView { background: %(panel)s; border: 1px solid %(line)s; selection-background-color: %(soft)s;
     selection-color: %(text)s; outline: none; padding: 3px; }
-QPushButton { background: %(raised)s; border: 1px solid %(line)s; border-radius: 5px; padding: 4px 12px; color: %(text)s; min-height: 18px; }
+QPushButton { background: %(raised)s; border: 1px solid %(line)s; border-radius: 5px; padding: 4px 10px; color: %(text)s;
+    min-height: 18px; }
 QPushButton:hover { background: %(hover)s; }
 QPushButton:pressed { background: %(soft)s; }
 QPushButton:focus, QPushButton:default { border-color: %(accent)s; }
@@ -145,12 +148,13 @@ def palette(theme: Theme) -> QPalette:
     """Qt's palette of a theme."""
     result = QPalette()
     roles = QPalette.ColorRole
-    for role, color in ((roles.Window, theme.panel), (roles.WindowText, theme.text), (roles.Base, theme.field), (roles.AlternateBase, theme.panel),
-                        (roles.Text, theme.text), (roles.Button, theme.raised), (roles.ButtonText, theme.text), (roles.BrightText, theme.error),
-                        (roles.ToolTipBase, theme.raised), (roles.ToolTipText, theme.text), (roles.PlaceholderText, theme.faint),
-                        (roles.Highlight, theme.accent), (roles.HighlightedText, theme.on_accent), (roles.Link, theme.accent),
-                        (roles.Accent, theme.accent), (roles.Light, theme.hover), (roles.Midlight, theme.raised), (roles.Mid, theme.line),
-                        (roles.Dark, theme.line), (roles.Shadow, theme.stage)):
+    for role, color in ((roles.Window, theme.panel), (roles.WindowText, theme.text), (roles.Base, theme.field),
+                        (roles.AlternateBase, theme.panel), (roles.Text, theme.text), (roles.Button, theme.raised),
+                        (roles.ButtonText, theme.text), (roles.BrightText, theme.error), (roles.ToolTipBase, theme.raised),
+                        (roles.ToolTipText, theme.text), (roles.PlaceholderText, theme.faint), (roles.Highlight, theme.accent),
+                        (roles.HighlightedText, theme.on_accent), (roles.Link, theme.accent), (roles.Accent, theme.accent),
+                        (roles.Light, theme.hover), (roles.Midlight, theme.raised), (roles.Mid, theme.line), (roles.Dark, theme.line),
+                        (roles.Shadow, theme.stage)):
         result.setColor(role, QColor(color))
     for role in (roles.WindowText, roles.Text, roles.ButtonText):
         result.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.faint))

@@ -9,7 +9,12 @@ from app.session import Session
 from app.theme import DARK, Theme
 from rtcore.fields import FieldError
 
+TOP = QModelIndex()     # above all rows
 BRANCHES = ("scene", "lights", "materials", "background")     # the rows of the first level
+
+TIPS = {"scene": "What the scene consists of", "lights": "What lights the scene",
+        "materials": "Materials that nodes name; select one to edit it", "material": "A material of the scene; select it to edit it",
+        "background": "What is seen where nothing is hit; select it to edit it"}
 
 
 class Row:
@@ -41,16 +46,16 @@ class SceneModel(QAbstractItemModel):
 
     # what Qt asks for
 
-    def rowCount(self, parent: QModelIndex = QModelIndex()) -> int:
+    def rowCount(self, parent: QModelIndex = TOP) -> int:
         return self._count(self._row(parent))
 
-    def columnCount(self, parent: QModelIndex = QModelIndex()) -> int:
+    def columnCount(self, parent: QModelIndex = TOP) -> int:
         return 1
 
-    def hasChildren(self, parent: QModelIndex = QModelIndex()) -> bool:
+    def hasChildren(self, parent: QModelIndex = TOP) -> bool:
         return self.rowCount(parent) > 0
 
-    def index(self, row: int, column: int, parent: QModelIndex = QModelIndex()) -> QModelIndex:
+    def index(self, row: int, column: int, parent: QModelIndex = TOP) -> QModelIndex:
         above = self._row(parent)
         if not (0 <= row < self._count(above) and column == 0):
             return QModelIndex()
@@ -63,6 +68,8 @@ class SceneModel(QAbstractItemModel):
         return QModelIndex() if above is self._root else self.createIndex(above.number, 0, above)
 
     def flags(self, index: QModelIndex) -> Qt.ItemFlag:
+        if not index.isValid():
+            return Qt.ItemFlag.NoItemFlags
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         row = self._row(index)
         if row.place.kind in ("node", "light"):
@@ -95,7 +102,8 @@ class SceneModel(QAbstractItemModel):
             if role == Qt.ItemDataRole.CheckStateRole:
                 on = Qt.CheckState(value) == Qt.CheckState.Checked
                 field = "visible" if row.place.kind == "node" else "on"
-                self._session.edit_record(row.place, msgspec.structs.replace(row.record, **{field: on}), f"{'show' if on else 'hide'} {name}")
+                record = msgspec.structs.replace(row.record, **{field: on})
+                self._session.edit_record(row.place, record, f"{'show' if on else 'hide'} {name}")
                 return True
             if role == Qt.ItemDataRole.EditRole and value.strip() != row.record.name:
                 self._session.edit_record(row.place, msgspec.structs.replace(row.record, name=value.strip()), f"rename {name}")
@@ -222,7 +230,7 @@ class SceneModel(QAbstractItemModel):
         kind = row.place.kind
         name = kind_of(row.record) if kind == "node" else type(row.record).__name__.lower() if kind == "light" else \
             {"materials": "material", "scene": "scene"}.get(kind, kind)
-        return icon(name, self._theme)
+        return icon(name, self._theme, switch=False)
 
     def _hidden(self, row: Row) -> bool:
         while row is not None:
@@ -242,5 +250,4 @@ class SceneModel(QAbstractItemModel):
             return "\n".join([*lines, "The box shows or hides it; double-click to rename"])
         if kind == "light":
             return f"{type(row.record).__name__} light\nThe box switches it on or off; double-click to rename"
-        return {"scene": "What the scene consists of", "lights": "What lights the scene", "materials": "Materials that nodes name; select one to edit it",
-                "background": "What is seen where nothing is hit; select it to edit it", "material": "A material of the scene; select it to edit it"}[kind]
+        return TIPS[kind]

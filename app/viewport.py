@@ -41,7 +41,7 @@ class Viewport(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAccessibleName("Picture of the scene")
-        self.setAccessibleDescription("Drag to orbit, middle or Shift and drag to pan, wheel to move nearer, click to select, W A S D Q E to fly")
+        self.setAccessibleDescription("Drag to orbit, Shift and drag to pan, wheel to move nearer, click to select, W A S D Q E to fly")
         session.frame_changed.connect(self._show_frame)
 
     def sizeHint(self) -> QSize:
@@ -62,7 +62,8 @@ class Viewport(QWidget):
         outline, borrowed = None, [pixels]
         if shown.outline is not None:
             x, y, argb = shown.outline
-            outline = QImage(argb.data, argb.shape[1], argb.shape[0], 4 * argb.shape[1], QImage.Format.Format_ARGB32_Premultiplied), QPointF(x, y)
+            high, wide = argb.shape
+            outline = QImage(argb.data, wide, high, 4 * wide, QImage.Format.Format_ARGB32_Premultiplied), QPointF(x, y)
             borrowed.append(argb)
         self._image, self._outline, self._bytes = image, outline, borrowed
         self.update()

@@ -2,9 +2,10 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, Slot
+from PySide6.QtCore import QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup, QGuiApplication, QKeySequence
-from PySide6.QtWidgets import QApplication, QDockWidget, QFileDialog, QMainWindow, QMenu, QMessageBox, QSizePolicy, QTabWidget, QToolButton, QWidget
+from PySide6.QtWidgets import (QApplication, QDockWidget, QFileDialog, QMainWindow, QMenu, QMessageBox, QSizePolicy, QTabWidget,
+                               QToolButton, QWidget)
 
 from app import dialogs, theme
 from app.actions import ACTIONS, MENUS, TOOLBAR, WORDED, Action
@@ -39,7 +40,8 @@ class Window(QMainWindow):
         self._sure = False
         self.setWindowIcon(app_icon())
         self.setAcceptDrops(True)
-        self.setDockOptions(QMainWindow.DockOption.AnimatedDocks | QMainWindow.DockOption.AllowTabbedDocks | QMainWindow.DockOption.AllowNestedDocks)
+        options = QMainWindow.DockOption
+        self.setDockOptions(options.AnimatedDocks | options.AllowTabbedDocks | options.AllowNestedDocks | options.GroupedDragging)
         self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, QTabWidget.TabPosition.North)
         self.viewport = Viewport(session, self)
         self.setCentralWidget(self.viewport)
@@ -71,7 +73,18 @@ class Window(QMainWindow):
                              | QDockWidget.DockWidgetFeature.DockWidgetClosable)
             dock.setAccessibleName(panel.title)
             dock.toggleViewAction().setToolTip(panel.tip)
+            dock.visibilityChanged.connect(self._title_docks)
             self.panels[panel.title], self.docks[panel.title] = widget, dock
+
+    @Slot()
+    def _title_docks(self):
+        """A dock among tabs has its title there and needs no second one below."""
+        for dock in self.docks.values():
+            among_tabs = bool(self.tabifiedDockWidgets(dock)) and not dock.isFloating()
+            if among_tabs and dock.titleBarWidget() is None:
+                dock.setTitleBarWidget(QWidget(dock))
+            elif not among_tabs and dock.titleBarWidget() is not None:
+                dock.setTitleBarWidget(None)
 
     def arrange(self):
         """The built-in arrangement: the tree left; right the rest in tabs, on a tall screen the properties below them."""
@@ -117,7 +130,6 @@ class Window(QMainWindow):
             menu = QMenu(title, self)
             menu.setToolTipsVisible(True)
             menu.aboutToShow.connect(fill)
-            fill()
             self._submenus[name] = menu
             fill()
         for title, names in MENUS:
@@ -160,9 +172,7 @@ class Window(QMainWindow):
                     button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
 
     def _fill_recent(self):
-        menu = self._submenus.get("<recent>")
-        if menu is None:
-            return
+        menu = self._submenus["<recent>"]
         menu.clear()
         for path in self.preferences.recent:
             menu.addAction(path.name, lambda path=path: self.open(path)).setToolTip(str(path))
@@ -172,24 +182,24 @@ class Window(QMainWindow):
             menu.addAction("Forget these", self.preferences.forget_recent).setToolTip("Empty this list; the files stay")
 
     def _fill_gallery(self):
-        menu = self._submenus.get("<gallery>")
-        if menu is not None:
-            menu.clear()
-            for title, path in gallery():
-                menu.addAction(title, lambda path=path: self.open(path)).setToolTip(f"Open {path.name}")
+        menu = self._submenus["<gallery>"]
+        menu.clear()
+        for title, path in gallery():
+            menu.addAction(title, lambda path=path: self.open(path)).setToolTip(f"Open {path.name}")
 
     def _fill_panels(self):
-        menu = self._submenus.get("<panels>")
-        if menu is not None and menu.isEmpty():
-            for dock in self.docks.values():
-                menu.addAction(dock.toggleViewAction())
+        menu = self._submenus["<panels>"]
+        menu.clear()
+        for dock in self.docks.values():
+            menu.addAction(dock.toggleViewAction())
 
     def _fill_theme(self):
-        menu = self._submenus.get("<theme>")
-        if menu is not None and menu.isEmpty():
+        menu = self._submenus["<theme>"]
+        if menu.isEmpty():
             group = QActionGroup(menu)
+            titles = {"system": "Like the &desktop", "light": "&Light", "dark": "&Dark"}
             for choice in theme.CHOICES:
-                action = menu.addAction({"system": "Like the &desktop", "light": "&Light", "dark": "&Dark"}[choice], lambda choice=choice: self.choose_theme(choice))
+                action = menu.addAction(titles[choice], lambda choice=choice: self.choose_theme(choice))
                 action.setCheckable(True)
                 action.setChecked(choice == self.preferences.theme)
                 action.setToolTip("Follow the desktop" if choice == "system" else f"The {choice} palette")
@@ -309,7 +319,8 @@ class Window(QMainWindow):
         for bar in (self.menuBar(), self.toolbar, self.statusBar()):
             bar.setVisible(not on)
         self.show_panels(not on)
-        self.setWindowState(self.windowState() | Qt.WindowState.WindowFullScreen if on else self.windowState() & ~Qt.WindowState.WindowFullScreen)
+        full, state = Qt.WindowState.WindowFullScreen, self.windowState()
+        self.setWindowState(state | full if on else state & ~full)
 
     def show_shortcuts(self):
         """The dialog of keys and mouse."""
@@ -346,7 +357,7 @@ class Window(QMainWindow):
 
     def _close_for_sure(self):
         self._sure = True
-        self.close()
+        QTimer.singleShot(0, self.close)        # not from within closeEvent, where a close is ignored
 
     def _unless_unsaved(self, doing: str, then: Callable[[], None]):
         """Do it at once if all is saved; else ask, and do it after the save or the discard."""

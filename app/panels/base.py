@@ -27,7 +27,7 @@ class Panel(QScrollArea):
         return QSize(300, 320)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(250, 90)
+        return QSize(self.widget().minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width(), 90)     # never cut at the side
 
 
 def button(text: str, tip: str, pressed, parent: QWidget | None = None) -> QPushButton:

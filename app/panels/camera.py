@@ -2,7 +2,7 @@
 import numpy as np
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QGridLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.editors import SliderEdit
 from app.forms import RecordForm, Section
@@ -13,7 +13,9 @@ from app.theme import DARK, Theme
 from rtcore.camera import Camera
 
 MATRICES = (("T₄", "t4", "moves the view to lookfrom"), ("R₃", "r3", "turns the view's axes u, v, w into the world's"),
-            ("S₂", "s2", "scales pixels to scene units and turns the sign of x"), ("T₁", "t1", "moves the picture's centre to the axis, at distance d = 1"))
+            ("S₂", "s2", "scales pixels to scene units and turns the sign of x"),
+            ("T₁", "t1", "moves the picture's centre to the axis, at distance d = 1"))
+CHAIN = "P_world = T₄ R₃ S₂ T₁ P, the chain that takes a pixel to the world"
 
 
 class CameraPanel(Panel):
@@ -26,21 +28,19 @@ class CameraPanel(Panel):
         self.form = RecordForm(lambda: session.camera or Camera(), lambda camera, label, merge: session.move(camera, merge), session.seal,
                                only=("lookfrom", "lookat", "up", "fov"), editors={"fov": SliderEdit(5, 120)})
         self.column.addWidget(self.form)
-        row = QGridLayout()
-        row.setSpacing(6)
         self.back = small_button(icon("back", DARK), "View back", "The view before this one (Alt+Left)", session.back)
         self.forward = small_button(icon("forward", DARK), "View forward", "The view that Back left (Alt+Right)", session.forward)
         everything = button("Frame all", "Draw back until everything is in the picture (Home)", session.frame_all)
-        chosen = button("Selection", "Draw back until the selected node fills the picture (F)", session.frame_selection)
-        chosen.setAccessibleName("Frame selection")
-        reset = button("Reset", "The camera that the file came with (Ctrl+Home)", session.reset_view)
-        for i, widget in enumerate((self.back, self.forward, everything, chosen, reset)):
-            row.addWidget(widget, 0, i)
-        for i in (2, 3, 4):
-            row.setColumnStretch(i, 1)
-        self.column.addLayout(row)
+        chosen = button("Frame selection", "Draw back until the selected node fills the picture (F)", session.frame_selection)
+        reset = button("Reset view", "The camera that the file came with (Ctrl+Home)", session.reset_view)
+        views, frames = QHBoxLayout(), QHBoxLayout()
+        for row, widgets in ((views, (self.back, self.forward, reset)), (frames, (everything, chosen))):
+            row.setSpacing(6)
+            for widget in widgets:
+                row.addWidget(widget, int(widget not in (self.back, self.forward)))
+            self.column.addLayout(row)
         self.chain = ChainView()
-        self.section = Section("Matrix chain", self.chain, opened=False, tip="P_world = T₄ R₃ S₂ T₁ P, the chain that takes a pixel to the world")
+        self.section = Section("Matrix chain", self.chain, opened=False, tip=CHAIN)
         self.column.addWidget(self.section)
         self.column.addStretch(1)
         self.section.toggled.connect(self.refresh)

@@ -19,7 +19,8 @@ class FogPanel(Panel):
 
     def __init__(self, session: Session, parent: QWidget | None = None):
         super().__init__(session, parent)
-        self.form = RecordForm(self._fog, self._commit, session.seal, editors={"density": SliderEdit(0.001, 2, log=True), "on": FlagEdit("There is fog")})
+        editors = {"density": SliderEdit(0.001, 2, log=True), "on": FlagEdit("There is fog")}
+        self.form = RecordForm(self._fog, self._commit, session.seal, editors=editors)
         self.column.addWidget(self.form)
         self.hint = QLabel()
         self.hint.setProperty("role", "hint")

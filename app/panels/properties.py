@@ -15,8 +15,8 @@ from app.theme import DARK, Theme
 from rtcore.fields import FieldError, Record
 from rtcore.scene import DEFAULT_MATERIAL, Checker, Material, Matrix, Node, Rotate, Scale, Shear, Translate
 
-NEW_TRANSFORMS = (("Translate", lambda: Translate((0, 0, 0))), ("Rotate", lambda: Rotate((0, 1, 0), 0)), ("Scale", lambda: Scale((1, 1, 1))),
-                  ("Shear", lambda: Shear()), ("Matrix", lambda: Matrix(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)))))
+NEW_TRANSFORMS = (Translate((0, 0, 0)), Rotate((0, 1, 0), 0), Scale((1, 1, 1)), Shear(),
+                  Matrix(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))))
 INHERITED, OWN = "inherited", "own"
 
 
@@ -60,7 +60,7 @@ class PropertiesPanel(Panel):
         points = [len(value) for value in (getattr(record.shape, name) for name in getattr(type(record.shape), "__struct_fields__", ()))
                   if isinstance(value, tuple) and value and isinstance(value[0], tuple) and len(value) <= MOST_ROWS]
         material = self._material(record)
-        return (type(record.shape), points, [type(t) for t in record.transform], material is None, isinstance(record.material, str) and record.material,
+        return (type(record.shape), points, [type(t) for t in record.transform], material is None, type(record.material),
                 material is not None and material.checker is not None, tuple(self.session.scene.materials))
 
     def _material(self, node: Node) -> Material | None:
@@ -80,7 +80,8 @@ class PropertiesPanel(Panel):
         elif isinstance(record, Node):
             self._build_node(place, record)
         else:
-            self._add_hint(f"{type(record).__name__} “{label_of(self.session.scene, place)}”" if place.kind != "background" else "Background")
+            title = label_of(self.session.scene, place)
+            self._add_hint(title if place.kind == "background" else f"{type(record).__name__} “{title}”")
             form = RecordForm(lambda: record_at(self.session.scene, place), self._commit(place), self.session.seal)
             self._add("record", form)
             if isinstance(record, Material):
@@ -121,7 +122,8 @@ class PropertiesPanel(Panel):
             label.setToolTip(type(transform).__doc__.splitlines()[0])
             head.addWidget(label)
             head.addStretch(1)
-            head.addWidget(small_button(icon("close", self._theme), f"Remove {kind.lower()}", f"Remove this {kind.lower()}", lambda i=i: drop(i)))
+            remove = f"Remove this {kind.lower()}"
+            head.addWidget(small_button(icon("close", self._theme), remove, remove, lambda i=i: drop(i)))
             column.addLayout(head)
             form = RecordForm(lambda i=i: read().transform[i], lambda t, label, merge, i=i: put(i, t, label, merge), self.session.seal)
             self.forms[f"transform {i}"] = form
@@ -132,8 +134,11 @@ class PropertiesPanel(Panel):
         add.setAccessibleName("Add a transform")
         add.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         menu = QMenu(add)
-        for name, make in NEW_TRANSFORMS:
-            menu.addAction(name, lambda make=make: commit(msgspec.structs.replace(read(), transform=(*read().transform, make())), "add transform", None))
+
+        def append(transform):
+            commit(msgspec.structs.replace(read(), transform=(*read().transform, transform)), "add transform", None)
+        for new in NEW_TRANSFORMS:
+            menu.addAction(type(new).__name__, lambda new=new: append(new))
         add.setMenu(menu)
         column.addWidget(add, 0, Qt.AlignmentFlag.AlignLeft)
         self.column.addWidget(Section("Transform", body, opened=bool(read().transform)))
@@ -163,10 +168,12 @@ class PropertiesPanel(Panel):
         """A check box for the pattern, and its fields while it is there."""
         def set_checker(checker, label, merge):
             commit(msgspec.structs.replace(read(), checker=checker), label, merge)
-        form.add("checker", FlagEdit("Two colours"), "A pattern of cubes of two colours in place of the colour.", lambda: read().checker is not None,
-                 lambda on: Checker() if on else None, lambda made, merge: set_checker(made, "checker", merge), self.session.seal)
+        form.add("checker", FlagEdit("Two colours"), "A pattern of cubes of two colours in place of the colour.",
+                 lambda: read().checker is not None, lambda on: Checker() if on else None,
+                 lambda made, merge: set_checker(made, "checker", merge), self.session.seal)
         if read().checker is not None:
-            inner = RecordForm(lambda: read().checker or Checker(), lambda made, label, merge: set_checker(made, f"checker {label}", merge), self.session.seal)
+            inner = RecordForm(lambda: read().checker or Checker(),
+                               lambda made, label, merge: set_checker(made, f"checker {label}", merge), self.session.seal)
             self.forms["checker"] = inner
             form.add_wide(inner)
 

@@ -1,0 +1,164 @@
+"""The render thread: latest job wins, buffers are not overwritten while painted, failures are told, kernels compile in a helper."""
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+from double import Double
+
+from app.compiling import Compiler
+from app.engine import Job
+from app.options import Options
+from app.outline import trace_outline
+from app.worker import Worker
+
+
+@pytest.fixture
+def start(qapp):
+    """Makes workers and closes them."""
+    made = []
+
+    def make(double: Double, **words) -> Worker:
+        made.append(Worker(renderer_factory=lambda: double, **words))
+        return made[-1]
+    yield make
+    for worker in made:
+        worker.close()
+
+
+def job(scene, number: int = 1, **words) -> Job:
+    return Job(number, scene, scene.camera, Options(), (64, 48), **words)
+
+
+def test_frames_arrive_and_the_last_is_done(start, qtbot, scene):
+    worker = start(Double())
+    with qtbot.waitSignal(worker.newest):
+        worker.submit(job(scene))
+    shown = []
+    qtbot.waitUntil(lambda: (shown.append(worker.take()) or True) and any(s and s.frame.done for s in shown))
+    last = [s for s in shown if s][-1]
+    assert last.bytes.shape == (48, 64, 4) and (last.bytes[..., 3] == 255).all()
+    blue, green, red, _ = last.bytes[24, 32].tolist()
+    assert red > blue + 60 and red > green + 60
+
+
+def test_a_newer_job_ends_the_older_one(start, qtbot, scene):
+    double = Double(pause=30.0)
+    worker = start(double)
+    worker.submit(job(scene, 1))
+    qtbot.waitUntil(lambda: len(double.jobs) == 1)
+    double.pause = 0.0
+    began = time.monotonic()
+    worker.submit(job(scene, 2))
+    worker.submit(job(scene, 3))
+    qtbot.waitUntil(lambda: len(double.jobs) >= 2 and double.jobs[-1].number == 3)
+    assert time.monotonic() - began < 1.0
+
+
+def test_a_step_of_a_drag_may_show_its_first_pass(start, qtbot, scene):
+    double = Double(pause=0.08)
+    worker, numbers = start(double), []
+    worker.newest.connect(lambda: numbers.append(worker.take().job.number))
+    for number in range(1, 13):
+        worker.submit(job(scene, number, continues=number > 1))
+        qtbot.wait(20)
+    qtbot.waitUntil(lambda: 12 in numbers)
+    assert len(set(numbers)) >= 3     # the drag showed something on its way
+
+
+def test_the_signal_is_coalesced_and_the_painted_buffer_left_alone(start, qtbot, scene):
+    worker, count = start(Double(spacings=(8, 4, 2, 1))), []
+    worker.newest.connect(lambda: count.append(1))
+    worker.submit(job(scene))
+
+    def finished(number: int) -> bool:
+        newest = worker._newest
+        return newest is not None and newest.job.number == number and newest.frame.done
+
+    qtbot.waitUntil(lambda: finished(1))
+    painted = worker.take()
+    before = painted.bytes.copy()
+    for number in range(2, 6):
+        worker.submit(job(scene, number))
+        qtbot.waitUntil(lambda number=number: finished(number))
+    assert (painted.bytes == before).all()
+    assert len(count) <= 2      # nobody took a frame, so nobody was told again
+    buffers = {id(b) for b in worker._spares} | {id(worker._newest.bytes), id(painted.bytes)}
+    assert len(buffers) <= 3
+
+
+def test_a_failure_is_told_and_the_thread_lives_on(start, qtbot, scene, capsys):
+    double = Double()
+    double.fail = ValueError("no such thing")
+    worker = start(double)
+    with qtbot.waitSignal(worker.failed) as told:
+        worker.submit(job(scene))
+    assert "no such thing" in told.args[0] and "\n" not in told.args[0]
+    assert "Traceback" in capsys.readouterr().err
+    double.fail = None
+    with qtbot.waitSignal(worker.newest):
+        worker.submit(job(scene, 2))
+
+
+def test_a_renderer_that_can_not_be_made_is_told(start, qtbot, capsys, monkeypatch):
+    def factory():
+        raise ImportError("no numba here")
+    gate = threading.Event()
+    worker = Worker(renderer_factory=lambda: gate.wait() and factory())
+    with qtbot.waitSignal(worker.failed) as told:
+        gate.set()
+    worker.close()
+    assert "no numba here" in told.args[0]
+    assert "no numba here" in capsys.readouterr().err
+
+
+HELPER = "import sys, time\nfor i, n in enumerate(sys.argv[1:]): print(i, len(sys.argv) - 1, n, flush=True); time.sleep(0.02)\n"
+
+
+def test_missing_kernels_are_compiled_by_a_helper_first(start, qtbot, scene):
+    double = Double(names=["sphere.f64", "plane.f64"])
+    worker, seen = start(double, compiler=Compiler((sys.executable, "-c", HELPER))), []
+    worker.progressed.connect(lambda: seen.append(worker.compiling and str(worker.compiling)))
+    with qtbot.waitSignal(worker.newest, timeout=10000):
+        worker.submit(job(scene))
+    qtbot.waitUntil(lambda: seen[-1] is None)
+    assert worker.compiling is None and len(seen) >= 3
+
+
+def test_a_helper_that_fails_is_told_and_the_picture_comes_all_the_same(start, qtbot, scene, capsys):
+    worker = start(Double(names=["sphere.f64"]), compiler=Compiler((sys.executable, "-c", "raise SystemExit('out of breath')")))
+    told = []
+    worker.failed.connect(told.append)
+    with qtbot.waitSignal(worker.newest, timeout=10000):
+        worker.submit(job(scene))
+    assert len(told) == 1 and "out of breath" in told[0]
+    assert "out of breath" in capsys.readouterr().err
+
+
+def test_closing_kills_the_helper_within_a_second(qapp, qtbot, scene):
+    helper = Compiler((sys.executable, "-c", "import time; time.sleep(60)"))
+    worker = Worker(renderer_factory=lambda: Double(names=["sphere"]), compiler=helper)
+    worker.submit(job(scene))
+    qtbot.waitUntil(lambda: worker._compiler._process is not None, timeout=5000)
+    began = time.monotonic()
+    worker.close()
+    assert time.monotonic() - began < 1.0 and not worker._thread.is_alive()
+
+
+def test_the_outline_rings_the_selected_pixels():
+    node = np.full((40, 60), -1, np.int32)
+    node[10:20, 20:30] = 4
+    assert trace_outline(node, (5, 9)) is None
+    outline = trace_outline(node, (4, 5), 2)
+    whole = np.zeros(node.shape, np.uint32)
+    high, wide = outline.pixels.shape
+    whole[outline.y:outline.y + high, outline.x:outline.x + wide] = outline.pixels
+    assert whole[9, 25] == whole[8, 25] == whole[15, 19] == whole[15, 30] == 0xFFFFB02E     # two pixels of ring on every side
+    assert whole[7, 25] == whole[10, 25] == 0x70000000 and whole[6, 25] == 0       # a halo outside and inside
+    assert not whole[11:19, 21:29].any()
+
+
+def test_an_outline_at_the_edge_stays_in_the_picture():
+    outline = trace_outline(np.zeros((30, 50), np.int32), (0, 1), 3)
+    assert (outline.x, outline.y) == (0, 0) and outline.pixels.shape == (30, 50)
