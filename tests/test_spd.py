@@ -83,7 +83,7 @@ def test_outlines_are_those_of_pov_ray(scenes, empty, name, tmp_path):
 
 @pytest.mark.parametrize("name", WITHOUT_GLASS)
 def test_outlines_are_those_of_the_authors_pictures(scenes, empty, name):
-    """His pictures are smoothed, so pixels on an outline belong to neither side; but for the thinnest twigs all others agree."""
+    """His pictures are smoothed: pixels on an outline belong to neither side. But for the thinnest twigs all others agree."""
     theirs, ours = background(scenes / "spd-reference" / f"{name}.png"), empty[name]
     inner = np.ones_like(ours)
     for dy in (-1, 0, 1):
@@ -97,5 +97,6 @@ def test_light_and_shadow_fall_as_in_the_authors_pictures(scenes, name, tmp_path
     """His were shaded in display values, ours in linear light: the tones differ, but not what is brighter than what."""
     scene = rtcore.load(scenes / "spd" / f"{name}.nff")
     rtcore.render(scene, size=(SIDE, SIDE), spp=1, max_depth=5).save(tmp_path / "ours.png")
-    ours, theirs = (brightness(Image.open(path).convert("RGB")) for path in (tmp_path / "ours.png", scenes / "spd-reference" / f"{name}.png"))
+    pictures = tmp_path / "ours.png", scenes / "spd-reference" / f"{name}.png"
+    ours, theirs = (brightness(Image.open(path).convert("RGB")) for path in pictures)
     assert np.corrcoef(ours, theirs)[0, 1] > 0.7
