@@ -36,6 +36,7 @@ class Notice(QFrame):
         self.hide()
         parent.installEventFilter(self)
         session.said.connect(self.say)
+        session.document.replaced.connect(self.hide)    # what was said of another file is over
 
     def dress(self, theme: Theme):
         self._theme = theme
