@@ -55,7 +55,7 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         key = tuple((index, leaves[index].shape, leaves[index].matrix.tobytes()) for index in kinds[kind])
         group = old.get(kind)
         if group is None or not _same(group.key, key):
-            group = _gather(kind, key, [(index, _packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
+            group = _gather(kind, key, [(index, _packed(leaves[index])) for index in kinds[kind]], leaves, dtype)
         groups.append(group._replace(first=first))
         owners.append(group.owner)
         first += len(group.owner)
@@ -69,16 +69,11 @@ def _same(a: tuple, b: tuple) -> bool:
     return len(a) == len(b) and all(x[0] == y[0] and x[1] is y[1] and x[2] == y[2] for x, y in zip(a, b))
 
 
-def _packed(leaf: Leaf, dtype) -> Packed:
-    """A leaf's primitives, checked to be finite in the precision of the render."""
+def _packed(leaf: Leaf) -> Packed:
     try:
-        packed = leaf.shape.pack(leaf.matrix)
+        return leaf.shape.pack(leaf.matrix)
     except FieldError as error:
         raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
-    with np.errstate(over="ignore"):
-        if not np.isfinite(packed.data.astype(dtype)).all():
-            raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
-    return packed
 
 
 def place(leaf: Leaf) -> str:
@@ -91,6 +86,11 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
     data = np.concatenate([p.data for _, p in packs])
     lengths = [len(p.data) for _, p in packs]
     owner = np.repeat(np.array([index for index, _ in packs], np.int32), lengths)
+    with np.errstate(over="ignore"):
+        wild = owner[~np.isfinite(data.astype(dtype)).all(axis=1)]
+    if len(wild):
+        leaf = leaves[wild[0]]
+        raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
     side = np.repeat(np.array([SIDES[leaves[index].shape.sides] + (MIRRORED if p.mirrored else 0) for index, p in packs], np.int8), lengths)
     extra = np.zeros((0, 3 if kind.shared_extra else 9))
     if kind.shared_extra:

@@ -20,7 +20,7 @@ try:
 except ImportError:     # Windows
     resource = None
 
-from rtcore import film as films
+from rtcore import film as films, warm
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
 from rtcore.plan import VIEW, plan
@@ -179,7 +179,8 @@ class Renderer:
         self._pool: ThreadPoolExecutor | None = None
         self._threads = 0
         self._render: Render | None = None
-        self._prepare = 0.0
+        self._kernels: set[str] = set()
+        self._compile = self._prepare = 0.0
 
     def close(self) -> None:
         """End the threads."""
@@ -203,13 +204,15 @@ class Renderer:
         """The pictures of a request, coarse ones first if wanted, the last one with `done`. Once `cancelled()` is true the running pass
         ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far."""
         start = time.perf_counter()
+        self._load_kernels(request)
+        loaded = time.perf_counter()
         threads = request.settings.threads or cores()
         geometry = self.geometry(request.scene, request.settings.precision)
         self._render = render = Render(request, geometry, threads, coarse)
         if self._pool is None or self._threads != threads:
             self.close()
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
-        self._prepare = render.prepared - start
+        self._compile, self._prepare = loaded - start, render.prepared - loaded
         for number in range(len(render.schedule)):
             render.number = number
             for finished in render.trace(self._pool, cancelled):
@@ -224,6 +227,13 @@ class Renderer:
             if done:
                 return
 
+    def _load_kernels(self, request: RenderRequest) -> None:
+        """Have all kernels at hand before the clock of the trace starts: from the cache, or compiled."""
+        needed = [name for name in plan(request.scene, request.settings).kernels if name not in self._kernels]
+        if needed:
+            warm.compile_kernels(needed)
+            self._kernels.update(needed)
+
     def picture(self) -> np.ndarray:
         """What the last request has come to so far, linear (h, w, 3) float32."""
         return self._render.frame(True).pixels
@@ -233,8 +243,8 @@ class Renderer:
         render = self._render
         settings = render.settings
         return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
-                "threads": self._threads, "rays": render.rays(), "seconds": {"prepare": self._prepare, "trace": render.elapsed},
-                "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
+                "threads": self._threads, "rays": render.rays(),
+                "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed}, "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in render.plan.left_out],
                 "error": {"rmse_estimate": films.rmse_estimate(render.film)}}
 

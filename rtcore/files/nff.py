@@ -26,7 +26,7 @@ BLINN = 4.0     # Phong's cosine to the power n is about as wide as Blinn's to t
 ENTITIES = ("v", "b", "l", "f", "s", "c", "p", "pp")
 
 _VIEW = {"from": 3, "at": 3, "up": 3, "angle": 1, "hither": 1, "resolution": 2}     # words of a view and how many numbers each has
-_NAMES = {"lookfrom": "from", "lookat": "at", "fov": "angle", "diffuse": "Kd", "specular": "Ks", "apex": "apex centre"}    # NFF's, of fields
+_NAMES = {"lookfrom": "from", "lookat": "at", "fov": "angle", "diffuse": "Kd", "specular": "Ks", "apex": "apex centre"}  # NFF's
 _FLAT = 1e-12       # a polygon with less area than this share of its extent squared has none
 
 
@@ -145,8 +145,8 @@ class _Reader:
         color = tuple(linear_from_srgb(min(max(c, 0.0), 1.0)) for c in (r, g, b))
         # The index may be anything, even 0, where nothing goes through.
         self._fills.append(_Fill(Material(
-            color=color, diffuse=diffuse, specular=specular, shininess=max(BLINN * shine, 1e-3), reflection=min(specular, 1.0), fresnel=False,
-            transmission=min(max(clear, 0.0), 1.0), ior=index if index > 0 else 1.0), [], [], [], [], []))
+            color=color, diffuse=diffuse, specular=specular, shininess=max(BLINN * shine, 1e-3), reflection=min(specular, 1.0),
+            fresnel=False, transmission=min(max(clear, 0.0), 1.0), ior=index if index > 0 else 1.0), [], [], [], [], []))
 
     def _read_s(self):
         x, y, z, radius = self._numbers(4, "centre and radius of a sphere")

@@ -8,6 +8,7 @@ Every kind's module has two kernels with these signatures:
     intersect(rays, n, tree, table, first, opacity)     rays 0 .. n-1 against all primitives; reports through wave.record
     surface(rays, n, out, table, first)                 wave.Surface rows of the rays that hit primitive first .. first + len(table) - 1
 """
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -58,12 +59,18 @@ class Kind:
 
 def similarity(matrix: np.ndarray) -> float | None:
     """The scale of a 4 x 4 matrix that only moves, turns, mirrors and scales evenly, else None."""
-    linear = matrix[:3, :3]
-    square = linear.T @ linear
-    scale = square[0, 0]
-    if not np.allclose(square, scale * np.eye(3), rtol=0, atol=4e-16 * scale):
+    return _similarity(matrix[:3, :3].tobytes())
+
+
+@functools.lru_cache(maxsize=4096)      # thousands of leaves share a few matrices, and are asked twice
+def _similarity(linear: bytes) -> float | None:
+    m = np.frombuffer(linear).reshape(3, 3)
+    most = np.abs(m).max()
+    m = m / most        # so that no square overflows or underflows
+    square = m.T @ m
+    if np.abs(square - square[0, 0] * np.eye(3)).max() > 4 * np.finfo(float).eps * square[0, 0]:
         return None
-    return float(np.sqrt(scale))
+    return float(most * np.sqrt(square[0, 0]))
 
 
 #: Columns of a placed unit shape: centre c, rows of the matrix L with p_unit = L (p - c), rows of its inverse M, reach; a kind's own
