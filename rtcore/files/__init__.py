@@ -3,7 +3,7 @@ import os
 
 from rtcore.files import image, mesh, nff, scene
 from rtcore.files._errors import FileError, WriteError, unknown
-from rtcore.files._writing import writable
+from rtcore.files._writing import writable, write_file
 from rtcore.files.image import save_image
 from rtcore.files.scene import save
 from rtcore.scene import Scene
@@ -12,7 +12,7 @@ FORMATS = (scene, nff, mesh)    # each has its SUFFIXES and load(path) -> Scene
 LOADABLE = tuple(suffix for form in FORMATS for suffix in form.SUFFIXES)
 PICTURES = image.SUFFIXES
 
-__all__ = ["FORMATS", "LOADABLE", "PICTURES", "FileError", "WriteError", "load", "save", "save_image", "writable"]
+__all__ = ["FORMATS", "LOADABLE", "PICTURES", "FileError", "WriteError", "load", "save", "save_image", "writable", "write_file"]
 
 
 def load(path: str | os.PathLike) -> Scene:

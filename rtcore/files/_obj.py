@@ -77,7 +77,8 @@ def _three_finite(numbers: str) -> bool:
 
 def _absolute(corner: str, counts: dict[str, int]) -> str:
     """A corner such as ``-1//-1`` with indices from the start of the file."""
-    return "/".join(str(count + 1 + int(index)) if index.startswith("-") else index for count, index in zip(counts.values(), corner.split("/")))
+    indices = zip(counts.values(), corner.split("/"))
+    return "/".join(str(count + 1 + int(index)) if index.startswith("-") else index for count, index in indices)
 
 
 def _out_of_range(kind: str, count: int, corner: str, line: int) -> ObjError:

@@ -3,23 +3,21 @@ import contextlib
 import os
 import secrets
 import stat
-from collections.abc import Callable
-from typing import BinaryIO
 
 from rtcore.files._errors import WriteError, reason
 
 
-def replace_file(path: str | os.PathLike, write: Callable[[BinaryIO], None]) -> None:
-    """Let `write` fill a new file beside `path`, then put it in the place of the old one at one stroke.
+def write_file(path: str | os.PathLike, data: bytes) -> None:
+    """Write a new file beside `path`, then put it in the place of the old one at one stroke.
 
-    A link is followed and the old file's permissions are kept. WriteError if that can't be done; whatever `write` itself
-    raises passes through. Either way the old file is as it was and nothing is left beside it.
+    A link is followed and the old file's permissions are kept. WriteError if that can't be done; the old file is then as it
+    was and nothing is left beside it.
     """
     target = writable(path)
     beside = os.path.join(os.path.dirname(target), f".{os.path.basename(target)[:80]}.{secrets.token_hex(4)}.part")
     try:
         with open(beside, "xb") as file:
-            write(file)
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         with contextlib.suppress(FileNotFoundError):

@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 from rtcore.files._errors import WriteError
-from rtcore.files._writing import replace_file
+from rtcore.files._writing import write_file
 
 SUFFIXES = (".png", ".exr")
 _ROWS = 1 << 20     # pixels that are turned to 8 bits at a time
@@ -23,7 +23,7 @@ def save_image(pixels: np.ndarray, path: str | os.PathLike, *, software: str = "
     check_suffix(path)
     text = {"Software": software, **(text or {})}
     data = _exr(path, pixels, text) if os.fspath(path).lower().endswith(".exr") else _png(pixels, text)
-    replace_file(path, lambda file: file.write(data))
+    write_file(path, data)
 
 
 def check_suffix(path: str | os.PathLike) -> None:

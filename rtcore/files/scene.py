@@ -18,7 +18,7 @@ from rtcore.camera import Camera
 from rtcore.fields import FieldError, Record, fields_of, number
 from rtcore.files._errors import FileError, Said, WriteError, read_text, unknown
 from rtcore.files._meshes import MeshFiles
-from rtcore.files._writing import replace_file
+from rtcore.files._writing import write_file
 from rtcore.files._yaml import TextError, line_of, parse
 from rtcore.files._yamlout import Block, dump
 from rtcore.lights import LIGHTS
@@ -72,7 +72,7 @@ def save(scene: Scene, path: str | os.PathLike) -> None:
     if len(data) > MOST_BYTES:
         raise WriteError.expected(path, f"a scene of at most {MOST_BYTES >> 20} MiB as text, which is all that is read back",
                                  Said(f"{len(data) >> 20} MiB"))
-    replace_file(path, lambda file: file.write(data))
+    write_file(path, data)
 
 
 @functools.cache

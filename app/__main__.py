@@ -1,0 +1,93 @@
+"""The command line: `rayscope [SCENE]` opens the window, `rayscope COMMAND ...` does its work without one.
+
+Exit codes: 0 done, 1 the work failed, 2 wrong use or a bad input file, 130 interrupted.
+"""
+import os
+import sys
+from difflib import get_close_matches
+from importlib import metadata
+
+from app.commands import COMMANDS, render
+from app.commands._shared import Parser, Refused, say
+
+FALLBACK = "rayscope.png"       # what the scene is rendered to where there is no display
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command line (`sys.argv` unless given) and return the exit code."""
+    argv = sys.argv[1:] if argv is None else argv
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")       # a file's name may be no text
+    try:
+        code = _run(argv)
+        sys.stdout.flush()
+        return code
+    except SystemExit as error:     # argparse: after --help, or a usage error that it has explained
+        return error.code if isinstance(error.code, int) else 2
+    except Refused as error:
+        say(str(error))
+        return error.code
+    except MemoryError:
+        say("there is not enough memory for this")
+        return 1
+    except KeyboardInterrupt:
+        say("interrupted; nothing was written")
+        return 130
+    except OSError as error:        # results can't be written to stdout: its reader has gone, or a disk is full
+        if not isinstance(error, BrokenPipeError):
+            say(f"stdout: cannot be written: {error.strerror or error}")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())      # or Python would try again on exit, and complain
+        return 1
+
+
+def _run(argv: list[str]) -> int:
+    commands = {command.NAME: command for command in COMMANDS}
+    if argv and argv[0] in commands:
+        command = commands[argv[0]]
+        parser = Parser(prog=f"rayscope {command.NAME}", description=command.HELP)
+        command.arguments(parser)
+        return command.run(parser.parse_args(argv[1:]), parser)
+
+    parser = Parser(prog="rayscope", description="Explore a scene by ray tracing.", usage="rayscope [SCENE] | rayscope COMMAND ...",
+                    epilog="commands, each with a --help of its own:\n" + "\n".join(f"  {c.NAME:12} {c.HELP}" for c in COMMANDS))
+    parser.add_argument("scene", metavar="SCENE", nargs="?", help="scene or mesh file to open in the window")
+    parser.add_argument("--version", action="version", version=f"rayscope {_version()}")
+    scene = parser.parse_args(argv).scene
+    if scene is not None and "." not in scene and not os.path.exists(scene):
+        near = "".join(f" (did you mean {word!r}?)" for word in get_close_matches(scene, commands, 1, 0.6))
+        parser.error(f"expected a scene file or one of {', '.join(commands)}, got {scene!r}{near}")
+    return _window(scene)
+
+
+def _window(scene: str | None) -> int:
+    """Open the window, or where there is no display say so and render instead."""
+    if has_display():
+        from app.gui import run
+        return run(scene)
+    if scene is None:
+        from app.gallery import FIRST_SCENE
+        scene = str(FIRST_SCENE)
+    say(f"there is no display for the window; rendering {scene} to {FALLBACK} instead")
+    parser = Parser(prog="rayscope render")
+    render.arguments(parser)
+    return render.run(parser.parse_args([f"-o{FALLBACK}", "--", scene]), parser)
+
+
+def has_display() -> bool:
+    """Whether a window can be hoped for: always but on Linux and the like, where a display is named by the environment."""
+    if sys.platform in ("darwin", "win32"):
+        return True
+    return any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM"))
+
+
+def _version() -> str:
+    try:
+        return metadata.version("rayscope")
+    except metadata.PackageNotFoundError:       # run from a checkout
+        import rtcore
+        return rtcore.__version__
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,7 @@
+"""The commands of the command line: one file each. Listed once, here.
+
+A command has NAME, HELP in one line, `arguments(parser)` and `run(args, parser) -> exit code`. None of them imports Qt.
+"""
+from app.commands import check, plan, render, warm
+
+COMMANDS = (render, plan, check, warm)

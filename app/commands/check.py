@@ -1,0 +1,36 @@
+"""`rayscope check`: whether a scene file is sound."""
+from app.commands._shared import Parser, loaded, refusing
+
+NAME = "check"
+HELP = "say whether a scene file is sound, or where it is not"
+
+
+def arguments(parser: Parser) -> None:
+    """The options of the command."""
+    parser.add_argument("scene", metavar="SCENE", help="scene or mesh file")
+
+
+def run(args, parser: Parser) -> int:
+    """Load the scene and place every shape in it as a render would."""
+    scene, _ = loaded(args.scene)
+    with refusing(args.scene):
+        leaves = list(scene.leaves())
+        for leaf in leaves:
+            _place(leaf)
+    lights = "studio lights" if scene.lights is None else _counted(len(scene.lights), "light")
+    print(f"{args.scene}: sound: {_counted(len(leaves), 'shape')}, {lights}")
+    return 0
+
+
+def _place(leaf) -> None:
+    """FieldError if the shape can't stand where it is put: the transforms around it are singular only all together."""
+    from rtcore.fields import FieldError
+    from rtcore.flatten import place
+    try:
+        leaf.shape.pack(leaf.matrix)
+    except FieldError as error:
+        raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count:,} {what}{'s' * (count != 1)}"
