@@ -31,15 +31,21 @@ class Engine:
         from rtcore import film, progressive, warm
         self._film, self._progressive, self._warm = film, progressive, warm
         self._renderer = progressive.Renderer()
+        self._warmed: tuple[Scene, Options] | None = None
 
     def request(self, job: Job) -> "RenderRequest":
         """The renderer's own form of a job."""
         settings = self._progressive.Settings(size=job.size, **job.options.settings())
         return self._progressive.RenderRequest(job.scene, job.camera, settings)
 
-    def missing(self, request: "RenderRequest") -> list[str]:
-        """Names of the kernels that this request needs and the cache does not have yet."""
-        return self._warm.missing(request.scene, request.settings)
+    def missing(self, job: Job) -> list[str]:
+        """Names of the kernels that this job needs and the cache does not have yet. A scene of thousands of shapes is looked
+        through once, not at every step of a drag."""
+        if self._warmed is not None and self._warmed[0] is job.scene and self._warmed[1] == job.options:
+            return []
+        names = self._warm.missing(job.scene, self.request(job).settings)
+        self._warmed = None if names else (job.scene, job.options)
+        return names
 
     def frames(self, request: "RenderRequest", cancelled: Callable[[], bool]) -> "Iterator[Frame]":
         """The passes of a picture, from coarse to fine."""

@@ -105,7 +105,7 @@ class Window(QMainWindow):
         tabs[0].raise_()
         self.resizeDocks([self.docks["Scene"], tabs[0]], [230, 320], Qt.Orientation.Horizontal)
         if last not in tabs:
-            self.resizeDocks([tabs[0], last], [360, 520], Qt.Orientation.Vertical)
+            self.resizeDocks([tabs[0], last], [310, 2000], Qt.Orientation.Vertical)
 
     def _make_actions(self):
         for entry in ACTIONS:

@@ -16,7 +16,7 @@ from app.outline import Outline, trace_outline
 if TYPE_CHECKING:
     from rtcore.progressive import Frame
 
-PATIENCE = 0.25     # s that a step of a drag may take to its first pass though a newer step waits; else a fast drag would show nothing
+PATIENCE = 1.0      # s that a step of a drag may take to its first pass though a newer step waits; else a fast drag would show nothing
 
 
 class Shown(NamedTuple):
@@ -112,7 +112,7 @@ class Worker(QObject):
 
     def _render(self, engine: Engine, job: Job):
         request = engine.request(job)
-        if names := engine.missing(request):
+        if names := engine.missing(job):
             self._compile(names)
             with self._wake:
                 if self._next is not None or self._closing:

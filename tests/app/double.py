@@ -39,7 +39,7 @@ class Double:
             raise self.fail
         return job
 
-    def missing(self, request: Job) -> list[str]:
+    def missing(self, job: Job) -> list[str]:
         names, self.names = self.names, []
         return names
 

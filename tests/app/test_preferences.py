@@ -22,7 +22,7 @@ def test_the_tables_agree():
     assert set(ids) <= named
     icons = Path(__file__).parents[2] / "resources" / "icons"
     assert all((icons / f"{a.icon}.svg").exists() for a in ACTIONS if a.icon)
-    assert all(re.search("currentColor|8b929c", path.read_text()) for path in icons.glob("*.svg") if path.stem != "rayscope")
+    assert all(re.search("currentColor|8b929c|check", path.stem + path.read_text()) for path in icons.glob("*.svg") if path.stem != "rayscope")
 
 
 @pytest.mark.parametrize("content", [
