@@ -162,14 +162,11 @@ def hit_flat(rays, i, j, p, data, q, slant, axis, alone, side, opacity):
     if any_lane(ok):
         det = u + v + w
         inverse = load(slant, 2, j)
-        if side != 0:
-            # along -axis the sheared triangle is seen from behind
+        if side & (FRONT | BACK):
+            # a ray along -axis, inverse < 0, sees the front where det < 0
             facing = det * inverse
-            shown = facing < 0 if side == FRONT or side == BACK + MIRRORED else facing > 0
-            if side == MIRRORED:
-                shown = det * det > 0
-            ok = ok & shown
-        record(rays, i, p, (u * az + v * bz + w * cz) / det * inverse, ok & (det * det > 0), opacity)
+            ok = ok & (facing > 0) if side == FRONT or side == BACK + MIRRORED else ok & (facing < 0)
+        record(rays, i, p, (u * az + v * bz + w * cz) / det * inverse, ok & ((det < 0) | (det > 0)), opacity)
 
 
 @kernel
