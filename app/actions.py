@@ -65,5 +65,5 @@ WORDED = ("shadows", "fog", "reflections")
 #: What the mouse and the fly keys do in the picture, for the shortcuts' dialog.
 MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"),
          ("Wheel, right drag", "nearer or farther; the wheel toward the cursor"), ("Click", "select what is seen there"),
-         ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "select nothing"),
+         ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "select nothing; leave the full screen"),
          ("Up, Down in a number", "step it; Page Up and Page Down by ten"))

@@ -1,6 +1,6 @@
 """The small dialogs of the window."""
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QKeySequence
+from PySide6.QtGui import QIcon, QKeySequence
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGridLayout, QLabel, QMessageBox, QScrollArea, QVBoxLayout, QWidget
 
 from app.actions import ACTIONS, MOUSE
@@ -38,6 +38,7 @@ def shortcuts_dialog(parent: QWidget) -> QDialog:
     area.setFrameShape(QScrollArea.Shape.NoFrame)
     area.setWidget(body)
     buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+    buttons.button(QDialogButtonBox.StandardButton.Close).setIcon(QIcon())
     buttons.rejected.connect(dialog.close)
     column = QVBoxLayout(dialog)
     column.addWidget(area)

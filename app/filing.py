@@ -29,10 +29,12 @@ class Filing(QObject):
         super().__init__(session)
         self._session = session
         self._latest = 0
+        self._complaint = ""                # about a file in whose stead another is read
         self.loading: Path | None = None    # what is being read right now
 
-    def open(self, path: Path, keep_view: bool = False):
-        """Read a scene file and show it, unless another is asked for before it is read."""
+    def open(self, path: Path, keep_view: bool = False, instead: Path | None = None):
+        """Read a scene file and show it, unless another is asked for before it is read. A file that can't be taken is told of,
+        and where there is nothing to keep, the scene at `instead` is shown."""
         path = Path(path).absolute()
         self._latest += 1
         ticket, aspect = self._latest, self._session.aspect
@@ -49,11 +51,18 @@ class Filing(QObject):
                 self._set_loading(None)
                 self._session.open_scene(loaded.scene, path, loaded.camera, keep_view)
                 self.opened.emit(path)
+                if self._complaint:
+                    self._session.said.emit("error", self._complaint)
+                    self._complaint = ""
 
         def failed(error: Exception):
             if ticket == self._latest:
                 self._set_loading(None)
-                self._session.said.emit("error", one_line(error, path))
+                if instead is not None and instead != path:
+                    self._complaint = one_line(error, path)
+                    self.open(instead)
+                else:
+                    self._session.said.emit("error", one_line(error, path))
 
         self._session.tasks.run(work, done, failed, name="load")
 

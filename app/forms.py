@@ -100,14 +100,17 @@ class Form(QWidget):
 
 
 class RecordForm(Form):
-    """The fields of one record. `read` gives the record as it is now, `commit(record, label, merge)` takes the changed one."""
+    """The fields of one record, or `only` some in that order. `read` gives the record as it is now, `commit(record, label, merge)`
+    takes the changed one."""
 
     def __init__(self, read: Callable[[], Record], commit: Callable[[Record, str, object], None], seal: Callable[[], None],
                  only: tuple[str, ...] | None = None, skip: tuple[str, ...] = (), editors: dict[str, Editor] | None = None):
         super().__init__()
         record = read()
-        for name, field in fields_of(type(record)).items():
-            if (only is not None and name not in only) or name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color)):
+        fields = fields_of(type(record))
+        for name in only or fields:
+            field = fields[name]
+            if name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color)):
                 continue
             value = getattr(record, name)
             editor = (editors or {}).get(name) or editor_for(field, value)

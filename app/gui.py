@@ -1,6 +1,7 @@
 """Starts the window."""
 import ctypes
 import os
+import signal
 import sys
 import threading
 import traceback
@@ -11,11 +12,12 @@ XCB = {"libxcb-cursor.so.0": "libxcb-cursor0", "libxcb-icccm.so.4": "libxcb-iccc
        "libxcb-keysyms.so.1": "libxcb-keysyms1", "libxcb-randr.so.0": "libxcb-randr0", "libxcb-render-util.so.0": "libxcb-render-util0",
        "libxcb-shape.so.0": "libxcb-shape0", "libxcb-sync.so.1": "libxcb-sync1", "libxcb-xfixes.so.0": "libxcb-xfixes0",
        "libxcb-xkb.so.1": "libxcb-xkb1", "libxcb-shm.so.0": "libxcb-shm0", "libxcb-render.so.0": "libxcb-render0", "libxcb.so.1": "libxcb1",
-       "libX11-xcb.so.1": "libx11-xcb1", "libxkbcommon-x11.so.0": "libxkbcommon-x11-0", "libxkbcommon.so.0": "libxkbcommon0"}
+       "libxcb-util.so.1": "libxcb-util1", "libX11-xcb.so.1": "libx11-xcb1", "libxkbcommon-x11.so.0": "libxkbcommon-x11-0"}
 
 #: What Qt's own libraries load, on any platform.
-CORE = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1", "libdbus-1.so.3": "libdbus-1-3", "libfontconfig.so.1": "libfontconfig1",
-        "libfreetype.so.6": "libfreetype6", "libglib-2.0.so.0": "libglib2.0-0"}
+CORE = {"libEGL.so.1": "libegl1", "libGL.so.1": "libgl1", "libfontconfig.so.1": "libfontconfig1", "libfreetype.so.6": "libfreetype6",
+        "libdbus-1.so.3": "libdbus-1-3",
+        "libglib-2.0.so.0": "libglib2.0-0", "libX11.so.6": "libx11-6", "libxkbcommon.so.0": "libxkbcommon0"}
 
 
 def missing_packages(libraries: dict[str, str]) -> list[str]:
@@ -70,7 +72,8 @@ def run(path: str | None) -> int:
     threading.excepthook = lambda args: report(session, args.exc_value)
     window = Window(session, Preferences())
     window.show()
-    window.filing.open(Path(path) if path is not None else FIRST_SCENE)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)     # Ctrl-C in the terminal ends the program; Qt's loop would never look
+    window.filing.open(Path(path) if path is not None else FIRST_SCENE, instead=FIRST_SCENE)
     try:
         return app.exec()
     finally:

@@ -166,7 +166,7 @@ class Session(QObject):
 
         def bounds():
             from rtcore.bounds import scene_bounds
-            return scene_bounds(scene)
+            return scene, scene_bounds(scene)
         self.tasks.run(bounds, self._frame_box, name="bounds")
 
     def frame_selection(self):
@@ -179,14 +179,16 @@ class Session(QObject):
             from rtcore.bounds import leaf_bounds
             boxes = [box for leaf in itertools.islice(scene.leaves(), first, last) if (box := leaf_bounds(leaf)) is not None]
             if not boxes:
-                return None
+                return scene, None
             lows, highs = (np.array(side) for side in zip(*boxes))
-            box = lows.min(axis=0), highs.max(axis=0)
-            return box if np.isfinite(box).all() else None
+            return scene, (lows.min(axis=0), highs.max(axis=0))
         self.tasks.run(bounds, self._frame_box, name="bounds")
 
-    def _frame_box(self, box):
-        if box is None:
+    def _frame_box(self, result):
+        scene, box = result
+        if scene is not self.scene:
+            return
+        if box is None or not np.isfinite(box).all():
             self.said.emit("info", "Nothing here has an end that could be framed.")
         elif self.camera is not None:
             self._try_move(moves.frame, *box, self.aspect, gesture=None)

@@ -108,7 +108,8 @@ QPushButton:pressed { background: %(soft)s; }
 QPushButton:focus, QPushButton:default { border-color: %(accent)s; }
 QPushButton:disabled { color: %(faint)s; background: %(panel)s; }
 QCheckBox { spacing: 7px; }
-QCheckBox::indicator, QTreeView::indicator { width: 13px; height: 13px; border: 1px solid %(faint)s; border-radius: 3px; background: %(field)s; }
+QCheckBox::indicator, QTreeView::indicator { width: 13px; height: 13px; border: 1px solid %(faint)s; border-radius: 3px;
+    background: %(field)s; }
 QCheckBox::indicator:hover, QTreeView::indicator:hover, QCheckBox::indicator:focus { border-color: %(accent)s; }
 QCheckBox::indicator:checked, QTreeView::indicator:checked { background: %(accent)s; border-color: %(accent)s;
     image: url(%(icons)s/check-%(name)s.svg); }

@@ -10,6 +10,8 @@ from app.theme import DARK, Theme
 from rtcore.fields import FieldError
 
 TOP = QModelIndex()     # above all rows
+SELECTABLE = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable       # made once: Qt asks for them row by row
+EDITABLE = SELECTABLE | Qt.ItemFlag.ItemIsUserCheckable | Qt.ItemFlag.ItemIsEditable
 BRANCHES = ("scene", "lights", "materials", "background")     # the rows of the first level
 
 TIPS = {"scene": "What the scene consists of", "lights": "What lights the scene",
@@ -70,11 +72,7 @@ class SceneModel(QAbstractItemModel):
     def flags(self, index: QModelIndex) -> Qt.ItemFlag:
         if not index.isValid():
             return Qt.ItemFlag.NoItemFlags
-        flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
-        row = self._row(index)
-        if row.place.kind in ("node", "light"):
-            flags |= Qt.ItemFlag.ItemIsUserCheckable | Qt.ItemFlag.ItemIsEditable
-        return flags
+        return EDITABLE if index.internalPointer().place.kind in ("node", "light") else SELECTABLE
 
     def data(self, index: QModelIndex, role: int = Qt.ItemDataRole.DisplayRole):
         if not index.isValid():

@@ -170,7 +170,7 @@ class Viewport(QWidget):
                     self._gesture = ("flight", next(_gestures))
                 self._held.add(event.key())
                 self._flying.start()
-        elif event.key() == Qt.Key.Key_Escape:
+        elif event.key() == Qt.Key.Key_Escape and self._session.selection is not None:
             self._session.select(None)
         else:
             super().keyPressEvent(event)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import (QApplication, QDockWidget, QFileDialog, QMainWind
 from app import dialogs, theme
 from app.actions import ACTIONS, MENUS, TOOLBAR, WORDED, Action
 from app.filing import Filing
-from app.gallery import gallery
+from app.gallery import GALLERY, gallery
 from app.icons import app_icon, icon
 from app.notices import Busy, Notice
 from app.panels import PANELS
@@ -21,6 +21,7 @@ from app.viewport import Viewport
 
 AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea}
 SCENES = "Scenes and meshes (*.yaml *.yml *.json *.nff *.obj *.ply *.stl *.glb *.gltf *.off);;All files (*)"
+UPPER = 300     # pixels of height for the panels above them
 TALL = 900      # pixels of a screen from which on the properties stand below the other panels and not behind them
 
 
@@ -105,7 +106,7 @@ class Window(QMainWindow):
         tabs[0].raise_()
         self.resizeDocks([self.docks["Scene"], tabs[0]], [230, 320], Qt.Orientation.Horizontal)
         if last not in tabs:
-            self.resizeDocks([tabs[0], last], [310, 2000], Qt.Orientation.Vertical)
+            self.resizeDocks([tabs[0], last], [UPPER, max(UPPER, self.height() - UPPER - 140)], Qt.Orientation.Vertical)
 
     def _make_actions(self):
         for entry in ACTIONS:
@@ -332,6 +333,12 @@ class Window(QMainWindow):
 
     # files dropped, window closed
 
+    def keyPressEvent(self, event):
+        if event.key() == Qt.Key.Key_Escape and self.isFullScreen():
+            self.fill_screen(False)
+        else:
+            super().keyPressEvent(event)
+
     def dragEnterEvent(self, event):
         if any(url.isLocalFile() for url in event.mimeData().urls()):
             event.acceptProposedAction()
@@ -372,5 +379,6 @@ class Window(QMainWindow):
 
     @Slot(object)
     def _remember(self, path: Path):
-        self.preferences.remember(path)
-        self._fill_recent()
+        if path.parent != GALLERY:
+            self.preferences.remember(path)
+            self._fill_recent()

@@ -9,6 +9,7 @@ from app.panels.base import Panel
 from app.session import Session
 from rtcore.scene import Fog
 
+ORDER = ("on", "kind", "color", "density", "start", "end")
 NONE = Fog(on=False)    # what the panel shows of a scene without fog
 
 
@@ -20,7 +21,7 @@ class FogPanel(Panel):
     def __init__(self, session: Session, parent: QWidget | None = None):
         super().__init__(session, parent)
         editors = {"density": SliderEdit(0.001, 2, log=True), "on": FlagEdit("There is fog")}
-        self.form = RecordForm(self._fog, self._commit, session.seal, editors=editors)
+        self.form = RecordForm(self._fog, self._commit, session.seal, only=ORDER, editors=editors)
         self.column.addWidget(self.form)
         self.hint = QLabel()
         self.hint.setProperty("role", "hint")

@@ -220,3 +220,11 @@ def test_a_picture_for_a_forbidden_place_is_refused(session, filing, tmp_path, q
     filing.save_picture(tmp_path / "none" / "picture.png")
     qtbot.waitUntil(lambda: bool(said), timeout=5000)
     assert said[-1][0] == "error" and "picture.png" in said[-1][1]
+
+
+def test_in_place_of_a_bad_first_file_another_is_shown(session, filing, tmp_path, qtbot, said):
+    good = tmp_path / "good.yaml"
+    rtcore.save(msgspec.structs.replace(session.scene, name="instead"), good)
+    with qtbot.waitSignal(filing.opened, timeout=5000):
+        filing.open(tmp_path / "none.yaml", instead=good)
+    assert session.scene.name == "instead" and said[-1][0] == "error" and "none.yaml" in said[-1][1]
