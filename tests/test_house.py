@@ -1,6 +1,8 @@
 """The rules of the house that a program can check: small files, no trace of one machine, nothing that others wrote."""
+import os
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -54,3 +56,18 @@ def test_scenes_and_meshes_are_all_our_own(scenes):
 def test_a_line_that_names_a_machine_would_be_found():
     assert OF_A_MACHINE.search('open("/' + 'home/someone/scene.yaml")')
     assert not OF_A_MACHINE.search("https://example.org/" + "home/page and scenes/" + "work/x")
+
+
+def test_the_installed_command_works_from_anywhere(tmp_path):
+    command = Path(sys.executable).with_name("rayscope")
+    if not command.exists():
+        pytest.skip("rayscope is not installed beside this Python")
+    ran = subprocess.run([command, "--version"], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+                         env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"})
+    assert (ran.returncode, ran.stdout.split()[0], ran.stderr) == (0, "rayscope", "")
+
+
+def test_every_folder_of_modules_is_a_package():
+    """A folder without __init__.py would be a namespace, which any other package of that name on the path hides."""
+    folders = {path.parent for path in SOURCES if path.relative_to(ROOT).parts[0] != "tests"}
+    assert [str(folder.relative_to(ROOT)) for folder in folders if not (folder / "__init__.py").is_file()] == []
