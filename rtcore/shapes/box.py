@@ -6,7 +6,7 @@ import numpy as np
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import greatest, least, load, load3, select, splat3
+from rtcore.lanes import greatest, least, load, load3, select, splat3, with_sign
 from rtcore.scene import Shape, invertible
 from rtcore.shapes.kind import CENTER, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
@@ -37,9 +37,11 @@ class Box(Shape, frozen=True):
 def hit_cube(rays, i, p, o, d, side, opacity):
     """Eight rays against the cube; a ray in the plane of a face (0·inf, a NaN) is left to the other slabs."""
     ix, iy, iz = 1 / d.x, 1 / d.y, 1 / d.z
-    x0, x1, y0, y1, z0, z1 = (-1 - o.x) * ix, (1 - o.x) * ix, (-1 - o.y) * iy, (1 - o.y) * iy, (-1 - o.z) * iz, (1 - o.z) * iz
-    enter = greatest(least(z0, z1), greatest(least(y0, y1), greatest(least(x0, x1), -np.inf)))
-    leave = least(greatest(z0, z1), least(greatest(y0, y1), least(greatest(x0, x1), np.inf)))
+    one = 1 + 0 * d.x
+    # the face through which a slab is left; its counterpart is entered. A sign knows them apart where a minimum sees a NaN
+    x, y, z = with_sign(one, d.x), with_sign(one, d.y), with_sign(one, d.z)
+    enter = greatest((-z - o.z) * iz, greatest((-y - o.y) * iy, greatest((-x - o.x) * ix, -np.inf)))
+    leave = least((z - o.z) * iz, least((y - o.y) * iy, least((x - o.x) * ix, np.inf)))
     if side == 0:
         t = select(enter > load(rays.ray, START, i), enter, leave)
     else:

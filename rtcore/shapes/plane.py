@@ -32,7 +32,7 @@ def intersect(rays, n, tree, table, first, opacity):
         point, normal, side = splat3(table.data, q, 0), splat3(table.data, q, 3), table.side[q]
         for i in range(0, n, 8):
             speed = dot(normal, load3(rays.ray, DX, i))
-            ok = speed * speed > 0
+            ok = (speed < 0) | (speed > 0)
             if side == FRONT:
                 ok = speed < 0
             elif side == BACK:

@@ -66,8 +66,9 @@ def hit_outline(rays, i, p, data, q, extra, side, opacity):
         return
     drop = int(data[q, DROP])
     a, b = (drop + 1) % 3, (drop + 2) % 3
-    x = load(rays.ray, OX + a, i) + t * load(rays.ray, DX + a, i)
-    y = load(rays.ray, OX + b, i) + t * load(rays.ray, DX + b, i)
+    # all seen from the ray's origin, so that a scene far from the world's keeps its digits
+    ox, oy = load(rays.ray, OX + a, i), load(rays.ray, OX + b, i)
+    x, y = t * load(rays.ray, DX + a, i), t * load(rays.ray, DX + b, i)
     first, count = int(data[q, FIRST]), int(data[q, COUNT])
     inside = speed < speed     # no lane
     previous = first + count - 1
@@ -76,7 +77,8 @@ def hit_outline(rays, i, p, data, q, extra, side, opacity):
         # written from the lower end up, so that two polygons sharing an edge decide alike whichever way each runs it
         if y0 > y1:
             x0, y0, x1, y1 = x1, y1, x0, y0
-        inside = inside ^ ((y >= y0) & (y < y1) & ((x - x0) * (y1 - y0) < (y - y0) * (x1 - x0)))
+        low = y0 - oy
+        inside = inside ^ ((y >= low) & (y < y1 - oy) & ((x - (x0 - ox)) * (y1 - y0) < (y - low) * (x1 - x0)))
         previous = k
     record(rays, i, p, t, ok & inside, opacity)
 
@@ -108,8 +110,9 @@ def surface(rays, n, out, table, first):
 def _bounds(data, extra):
     spans = [extra[int(f):int(f) + int(c)] for f, c in data[:, FIRST:COUNT + 1]]
     low, high = np.array([s.min(0) for s in spans]), np.array([s.max(0) for s in spans])
-    # the hit is on the plane, a rounding beside the outline
-    pad = 1e-6 * (high - low).max(1, keepdims=True)
+    # the hit is on the plane, beside the outline by what that is not flat or was rounded: along the axis dropped, at most √3 times that
+    beside = [np.abs((s - row[:3]) @ row[NORMAL:NORMAL + 3]).max() for s, row in zip(spans, data)]
+    pad = 1e-6 * (high - low).max(1, keepdims=True) + 2 * np.array(beside)[:, None]
     return low - pad, high + pad
 
 
