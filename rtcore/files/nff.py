@@ -2,8 +2,8 @@
 
 A file is a stream of tokens: an entity's word, then its numbers, which may break across lines. What a fill lights is gathered
 into as few nodes as stay readable: the triangles of a fill are one mesh, its patches another, its spheres a group, and so on.
-Colours are display values, and made linear here; so is the ambient light, the 0.1 of the format's reference reader. A light
-without a colour of its own has the intensity 1/sqrt(n) of n lights.
+Colours, Kd and the highlight are display values, and made linear here; so is the ambient light, the 0.1 of the format's reference
+reader. A light without a colour of its own has the intensity 1/sqrt(n) of n lights.
 """
 import math
 import os
@@ -143,9 +143,11 @@ class _Reader:
     def _read_f(self):
         r, g, b, diffuse, specular, shine, clear, index = self._numbers(8, "r g b Kd Ks Shine T ior of a fill")
         color = tuple(linear_from_srgb(min(max(c, 0.0), 1.0)) for c in (r, g, b))
+        # What adds up is a display value too; reflection and transmission scale light that is linear already. Below 0: the record refuses.
+        scattered, highlight = (linear_from_srgb(share) if share > 0 else share for share in (diffuse, specular))
         # The index may be anything, even 0, where nothing goes through.
         self._fills.append(_Fill(Material(
-            color=color, diffuse=diffuse, specular=specular, shininess=max(BLINN * shine, 1e-3), reflection=min(specular, 1.0),
+            color=color, diffuse=scattered, specular=highlight, shininess=max(BLINN * shine, 1e-3), reflection=min(specular, 1.0),
             fresnel=False, transmission=min(max(clear, 0.0), 1.0), ior=index if index > 0 else 1.0), [], [], [], [], []))
 
     def _read_s(self):

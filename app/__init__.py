@@ -1,0 +1,1 @@
+"""Rayscope's window and command line."""
