@@ -64,8 +64,14 @@ QToolButton:checked { border-color: %(accent)s; }
 QToolButton:focus { border-color: %(accent)s; }
 QToolButton::menu-indicator { image: none; }
 
-QDockWidget { color: %(muted)s; font-weight: 600; titlebar-close-icon: none; titlebar-normal-icon: none; }
+QDockWidget { color: %(muted)s; font-weight: 600; titlebar-close-icon: url(%(icons)s/dock-close.svg);
+    titlebar-normal-icon: url(%(icons)s/dock-float.svg); }
 QDockWidget::title { background: %(panel)s; padding: 7px 10px; border-bottom: 1px solid %(line)s; text-align: left; }
+QDockWidget::close-button, QDockWidget::float-button { border: none; border-radius: 4px; padding: 0; icon-size: 14px;
+    subcontrol-position: top right; subcontrol-origin: margin; position: absolute; top: 6px; width: 16px; height: 16px; }
+QDockWidget::close-button { right: 6px; }
+QDockWidget::float-button { right: 26px; }
+QDockWidget::close-button:hover, QDockWidget::float-button:hover { background: %(hover)s; }
 QDockWidget > QWidget { background: %(panel)s; }
 QTabBar { background: %(window)s; }
 QTabBar::tab { background: transparent; color: %(muted)s; padding: 6px 11px; border: none; border-bottom: 2px solid transparent; }

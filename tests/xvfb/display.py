@@ -85,7 +85,8 @@ class Hands:
             if self._stamp() != old and (state := self.state()) and until(state):
                 return state
             time.sleep(0.05)
-        raise Failed(f"{what}: did not come within {timeout:g} s; the state is {self.state()}\n{self.log()}")
+        state = {name: value for name, value in self.state().items() if name != "widgets"}
+        raise Failed(f"{what}: did not come within {timeout:g} s; the state is {state}\n{self.log()}")
 
     def settled(self, what: str, timeout: float = 60.0) -> dict:
         """Wait for the finished picture of things as they are."""

@@ -1,6 +1,6 @@
 """Drives the real window under Xvfb by mouse and keyboard, looks at the pixels, and exits with 1 if anything is not as it should be.
 
-    python tests/xvfb/drive.py [-o DIR] [--size WxH] [--theme light|dark]
+    python tests/xvfb/drive.py [-o DIR] [--size WxH] [--theme light|dark] [--scale FACTOR]
 
 Screenshots stay in DIR. Needs Xvfb, openbox, xdotool and ImageMagick's import.
 """
@@ -94,7 +94,7 @@ def drive(hands: Hands, folder: Path, scene: Path, other: Path, environment: dic
     expect((abs(picked - AMBER).max(axis=-1) < 8).sum() > 200, "the picked object is not outlined")
 
     row = hands.state()["rows"]["middle"]
-    hands.xdo("mousemove", row[0] + 9, row[1] + row[3] // 2, "sleep", "0.1", "click", "1")
+    hands.xdo("mousemove", row[0] + row[3] // 2, row[1] + row[3] // 2, "sleep", "0.1", "click", "1")
     hidden = hands.wait("hiding", lambda s: s["hidden"] == [[1]])
     expect(hidden["modified"], "hiding an object did not mark the document as modified")
     hands.settled("hiding")
@@ -109,7 +109,7 @@ def drive(hands: Hands, folder: Path, scene: Path, other: Path, environment: dic
     expect(saved.camera.fov == 60 and not saved.objects[1].visible, "the saved file lacks the view or the edit")
 
     source = subprocess.Popen([sys.executable, str(Path(__file__).with_name("drag_source.py")), str(other), str(x + 20), str(y + 20)],
-                              env=environment)
+                              env={**environment, "QT_SCALE_FACTOR": "1"})
     try:
         time.sleep(2.0)
         hands.drag((x + 60, y + 40), (x + w // 2, y + h // 2))
@@ -153,6 +153,7 @@ def main() -> int:
     parser.add_argument("-o", "--output", type=Path, help="folder for the screenshots")
     parser.add_argument("--size", default="1280x800", help="of the screen")
     parser.add_argument("--theme", choices=("light", "dark"), default="dark")
+    parser.add_argument("--scale", default="1", help="of everything in the window, as on a screen of that many times the pixels")
     options = parser.parse_args()
     if missing := missing_tools():
         print(f"drive.py: not installed: {', '.join(missing)}", file=sys.stderr)
@@ -168,6 +169,7 @@ def main() -> int:
     (folder / "bad.yaml").write_text("rayscope: 1\nscene: [{spere: {}}]\n")
     width, height = map(int, options.size.split("x"))
     with display(width, height, config.parent) as environment:
+        environment["QT_SCALE_FACTOR"] = options.scale
         hands = Hands(environment, folder, [str(scene)])
         try:
             drive(hands, folder, scene, other, environment)

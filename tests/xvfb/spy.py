@@ -22,9 +22,9 @@ from PySide6.QtWidgets import QWidget  # noqa: E402
 
 
 def place(widget: QWidget, rect: QRect) -> list[int]:
-    """A part of a widget on the screen: x, y, width, height."""
-    corner = widget.mapToGlobal(QPoint(rect.x(), rect.y()))
-    return [corner.x(), corner.y(), rect.width(), rect.height()]
+    """A part of a widget in pixels of the screen: x, y, width, height."""
+    corner, ratio = widget.mapToGlobal(QPoint(rect.x(), rect.y())), widget.devicePixelRatioF()
+    return [round(part * ratio) for part in (corner.x(), corner.y(), rect.width(), rect.height())]
 
 
 class Watched(app.window.Window):
