@@ -23,7 +23,7 @@ except ImportError:     # Windows
 from rtcore import film as films, warm
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
-from rtcore.plan import VIEW, plan
+from rtcore.plan import VIEW, Plan, plan
 from rtcore.scene import Scene
 from rtcore.settings import Settings
 from rtcore.trace import COUNTS, NONFINITE, Scratch, Tracer
@@ -89,9 +89,9 @@ def tiles(one: Pass, width: int, height: int) -> list[np.ndarray]:
 class Render:
     """One request under way: its film, its scratch arrays, how far it is."""
 
-    def __init__(self, request: RenderRequest, geometry: Geometry, threads: int, coarse: bool):
+    def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, threads: int, coarse: bool):
         scene, camera, self.settings = request
-        self.plan = plan(scene, self.settings, geometry.leaves)
+        self.plan = composed
         width, height = self.settings.size
         view = camera.rays(width, height)
         self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
@@ -179,6 +179,7 @@ class Renderer:
         self._pool: ThreadPoolExecutor | None = None
         self._threads = 0
         self._render: Render | None = None
+        self._planned: tuple[Scene, Settings, Plan] | None = None
         self._kernels: set[str] = set()
         self._compile = self._prepare = 0.0
 
@@ -204,11 +205,11 @@ class Renderer:
         """The pictures of a request, coarse ones first if wanted, the last one with `done`. Once `cancelled()` is true the running pass
         ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far."""
         start = time.perf_counter()
-        self._load_kernels(request)
+        composed = self._composed(request.scene, request.settings)
         loaded = time.perf_counter()
         threads = request.settings.threads or cores()
         geometry = self.geometry(request.scene, request.settings.precision)
-        self._render = render = Render(request, geometry, threads, coarse)
+        self._render = render = Render(request, composed, geometry, threads, coarse)
         if self._pool is None or self._threads != threads:
             self.close()
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
@@ -227,12 +228,16 @@ class Renderer:
             if done:
                 return
 
-    def _load_kernels(self, request: RenderRequest) -> None:
-        """Have all kernels at hand before the clock of the trace starts: from the cache, or compiled."""
-        needed = [name for name in plan(request.scene, request.settings).kernels if name not in self._kernels]
+    def _composed(self, scene: Scene, settings: Settings) -> Plan:
+        """The plan, made anew only for another scene or other settings, with all its kernels at hand: from the cache, or compiled."""
+        if self._planned is None or self._planned[0] is not scene or self._planned[1] != settings:
+            self._planned = scene, settings, plan(scene, settings)
+        composed = self._planned[2]
+        needed = [name for name in composed.kernels if name not in self._kernels]
         if needed:
             warm.compile_kernels(needed)
             self._kernels.update(needed)
+        return composed
 
     def picture(self) -> np.ndarray:
         """What the last request has come to so far, linear (h, w, 3) float32."""
