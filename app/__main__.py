@@ -36,7 +36,7 @@ def main(argv: list[str] | None = None) -> int:
         return 130
     except OSError as error:        # results can't be written to stdout: its reader has gone, or a disk is full
         if not isinstance(error, BrokenPipeError):
-            say(f"stdout: cannot be written: {error.strerror or error}")
+            say(f"{error.filename or 'stdout'}: {error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())      # or Python would try again on exit, and complain
         return 1
 

@@ -130,7 +130,8 @@ def enough_memory(width: int, height: int) -> None:
     """Refused with exit code 1 if a picture of that size can't be held: the system would end the process without a word."""
     need, there = width * height * BYTES_A_PIXEL, memory()
     if there is not None and need > there:
-        raise Refused(f"a picture of {width} x {height} needs about {need / 2**30:.1f} GiB of memory, and there are {there / 2**30:.1f} GiB", 1)
+        need, there = need / 2**30, there / 2**30
+        raise Refused(f"a picture of {width} x {height} needs about {need:.1f} GiB of memory, and there are {there:.1f} GiB", 1)
 
 
 def memory() -> int | None:

@@ -1,6 +1,8 @@
 """Scene files: one file a format. Listed once, here."""
 import os
 
+import numpy as np
+
 from rtcore.files import image, mesh, nff, scene
 from rtcore.files._errors import FileError, WriteError, unknown
 from rtcore.files._writing import writable, write_file
@@ -22,6 +24,7 @@ def load(path: str | os.PathLike) -> Scene:
     suffix = os.path.splitext(path)[1].lower()
     for form in FORMATS:
         if suffix in form.SUFFIXES:
-            return form.load(path)
+            with np.errstate(all="ignore"):     # numbers near the end of the float range are for the records to judge
+                return form.load(path)
     expected, got = unknown(suffix or os.path.basename(path), LOADABLE)
     raise FileError.expected(path, "a name that ends in " + expected, got)

@@ -19,6 +19,10 @@ class Block(dict):
     """A mapping that is written a line a word, however short it is."""
 
 
+class Lines(list):
+    """A list that is written a line an item, however short it is."""
+
+
 def dump(data: dict) -> str:
     """The text of a mapping with string keys that holds mappings, lists, tuples, strings, numbers, booleans and None.
 
@@ -70,6 +74,8 @@ def _line(value: Any, room: int) -> str | None:
             items.append(f"{_string(key)}: {text}")
             room -= len(items[-1]) + 2
     elif isinstance(value, (list, tuple)):
+        if isinstance(value, Lines) and value:
+            return None
         items, ends = [], "[]"
         for item in value:
             text = _line(item, room - 2)

@@ -8,6 +8,7 @@ import contextlib
 import functools
 import json
 import os
+import re
 import typing
 from typing import Any
 
@@ -20,7 +21,7 @@ from rtcore.files._errors import FileError, Said, WriteError, read_text, unknown
 from rtcore.files._meshes import MeshFiles
 from rtcore.files._writing import write_file
 from rtcore.files._yaml import TextError, line_of, parse
-from rtcore.files._yamlout import Block, dump
+from rtcore.files._yamlout import Block, Lines, dump
 from rtcore.lights import LIGHTS
 from rtcore.scene import MOST_NESTED, TRANSFORMS, Background, Fog, Material, Node, Scale, Scene
 from rtcore.shapes import SHAPES, Mesh
@@ -38,6 +39,7 @@ SHAPE_WORDS, LIGHT_WORDS, TRANSFORM_WORDS = _by_word(SHAPES), _by_word(LIGHTS), 
 NODE_WORDS = tuple(name for name in fields_of(Node) if name not in ("shape", "children", "use"))
 PLACES = (*SHAPE_WORDS, "group", "use")     # a node has exactly one of these
 ARRAYS = ("vertices", "faces", "normals")     # of a mesh; its file has them
+_NOT_YAML = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 SCENE_WORDS = ("rayscope", *(name for name in fields_of(Scene) if name != "objects"), "scene")
 
 
@@ -63,7 +65,7 @@ def save(scene: Scene, path: str | os.PathLike) -> None:
         raise WriteError.expected(path, "a name that ends in " + ", ".join(SUFFIXES), suffix or os.path.basename(path))
     plain = _Writer(os.path.dirname(os.path.abspath(path))).scene(scene)
     try:
-        data = (json.dumps(plain, indent=1, ensure_ascii=False) if suffix == ".json" else dump(plain)).encode()
+        data = (_json(plain) if suffix == ".json" else dump(plain)).encode()
     except UnicodeEncodeError as error:
         alone = ord(error.object[error.start])
         raise WriteError.expected(path, "text that UTF-8 can hold", Said(f"the lone surrogate U+{alone:04X}")) from None
@@ -73,6 +75,12 @@ def save(scene: Scene, path: str | os.PathLike) -> None:
         raise WriteError.expected(path, f"a scene of at most {MOST_BYTES >> 20} MiB as text, which is all that is read back",
                                  Said(f"{len(data) >> 20} MiB"))
     write_file(path, data)
+
+
+def _json(data: dict) -> str:
+    """The text of plain data as JSON that is YAML as well: letters that YAML takes for line ends, or not at all, are escaped."""
+    text = json.dumps(data, indent=1, ensure_ascii=False)
+    return _NOT_YAML.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 @functools.cache
@@ -252,7 +260,7 @@ class _Writer:
             if value is not None:
                 data[name] = self.record(value)
         if scene.lights is not None:
-            data["lights"] = [self.one_word(light) for light in scene.lights]
+            data["lights"] = Lines(self.one_word(light) for light in scene.lights)
         if scene.materials:
             data["materials"] = Block({name: self.record(material) for name, material in scene.materials.items()})
         if scene.definitions:
