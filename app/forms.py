@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QSizePolicy, QToolBut
 
 from app.bindings import Binding
 from app.editors import ChoiceEdit, ColorEdit, Editor, FlagEdit, GridEdit, MaybeEdit, SliderEdit, Summary, TextEdit
-from rtcore.fields import Choice, Color, Field, FieldError, Flag, Maybe, Number, Record, Text, Vector, Vectors, fields_of
+from rtcore.fields import Choice, Color, Field, FieldError, Flag, Maybe, Number, Numbers, Record, Text, Vector, Vectors, fields_of
 
 MOST_ROWS = 12      # of a list of points that is edited in place
 
@@ -35,6 +35,8 @@ def editor_for(field: Field, value: object) -> Editor:
         return GridEdit()
     if isinstance(field, Vector):
         return GridEdit(columns=3)
+    if isinstance(field, Numbers):
+        return GridEdit(rows=field.count // 2, columns=2) if field.count % 2 == 0 else GridEdit(columns=field.count)
     if isinstance(field, Color):
         return ColorEdit()
     if isinstance(field, Flag):

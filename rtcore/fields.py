@@ -102,6 +102,25 @@ class Vector(Field):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Numbers(Field):
+    """``count`` finite numbers."""
+
+    count: int = 1
+
+    def take(self, value):
+        expected = f"{self.count} finite numbers"
+        try:
+            if isinstance(value, (str, bytes, dict)):
+                raise TypeError
+            result = tuple(number(part) for part in value)
+        except (TypeError, ValueError, OverflowError):
+            raise FieldError(expected, value) from None
+        if len(result) != self.count:
+            raise FieldError(expected, value)
+        return result
+
+
+@dataclass(frozen=True, kw_only=True)
 class Color(Field):
     """Linear red, green, blue, none negative. A string ``"#rrggbb"`` is read as sRGB and stored linear."""
 

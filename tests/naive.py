@@ -5,12 +5,13 @@ the ray. None uses the kernels' tricks (unit shapes, closest approach, shear, bo
 solved as linear systems, a box is six rectangles. At 50 digits cancellation is no concern.
 """
 import functools
+import warnings
 from typing import NamedTuple
 
 import mpmath
 import numpy as np
 
-from rtcore import Box, Cone, Cylinder, Mesh, Plane, Polygon, Sphere, Triangle
+from rtcore import Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 mp = mpmath.MPContext()
 mp.dps = 50
@@ -170,7 +171,49 @@ def _cone(s: Cone, o, d):
     yield from _round(s.base, s.base_radius, s.apex, s.apex_radius, s.capped, o, d)
 
 
-TWINS = {Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone}
+def _quadric(s: Quadric, o, d):
+    """The form as the sum of its ten terms, each written out along the ray."""
+    a, b, c, m, n, p, g, h, i, j = (mp.mpf(x) for x in s.coefficients)
+    (x, y, z), (u, v, w) = o, d
+    square = a * u * u + b * v * v + c * w * w + m * u * v + n * u * w + p * v * w
+    mixed = m * (x * v + y * u) + n * (x * w + z * u) + p * (y * w + z * v)
+    half = (2 * (a * x * u + b * y * v + c * z * w) + mixed + g * u + h * v + i * w) / 2
+    rest = a * x * x + b * y * y + c * z * z + m * x * y + n * x * z + p * y * z + g * x + h * y + i * z + j
+    for t in quadratic(square, half, rest):
+        x, y, z = at = add(o, times(t, d))
+        if s.low is None or all(s.low[k] <= at[k] <= s.high[k] for k in range(3)):
+            yield t, (2 * a * x + m * y + n * z + g, 2 * b * y + m * x + p * z + h, 2 * c * z + n * x + p * y + i)
+
+
+def _torus(s: Torus, o, d):
+    """The quartic's raw coefficients, all its complex roots, the real ones of them."""
+    big, small = mp.mpf(s.major_radius), mp.mpf(s.minor_radius)
+    dd, od, k = dot(d, d), dot(o, d), dot(o, o) + big ** 2 - small ** 2
+    flat = [d[0] ** 2 + d[1] ** 2, 2 * (o[0] * d[0] + o[1] * d[1]), o[0] ** 2 + o[1] ** 2]
+    whole = [dd * dd, 4 * dd * od, 4 * od ** 2 + 2 * dd * k, 4 * od * k, k * k]
+    with warnings.catch_warnings():     # newer releases of mpmath want the order of coefficients said, older ones don't know the word
+        warnings.simplefilter("ignore", DeprecationWarning)
+        roots = mp.polyroots([w - 4 * big ** 2 * f for w, f in zip(whole, [0, 0, *flat])], maxsteps=500, extraprec=400)
+    for root in roots:
+        if abs(mp.im(root)) <= mp.mpf(10) ** -30 * (1 + abs(root)):
+            x, y, z = add(o, times(mp.re(root), d))
+            slope = 4 * (x * x + y * y + z * z + big ** 2 - small ** 2)
+            yield mp.re(root), (slope * x - 8 * big ** 2 * x, slope * y - 8 * big ** 2 * y, slope * z)
+
+
+def _polyhedron(s: Polyhedron, o, d):
+    """Every plane's hit that lies behind all the other planes."""
+    planes = [(vector(point), vector(normal)) for point, normal in s.planes]
+    for k, (point, normal) in enumerate(planes):
+        if dot(normal, d) != 0:
+            t = dot(normal, sub(point, o)) / dot(normal, d)
+            at = add(o, times(t, d))
+            if all(dot(n, sub(at, p)) <= 0 for j, (p, n) in enumerate(planes) if j != k):
+                yield t, normal
+
+
+TWINS = {Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone,
+         Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron}
 
 
 # --- placed shapes ---

@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 
 from rtcore import files
 from rtcore.camera import Camera
-from rtcore.fields import Choice, Color, FieldError, Flag, Maybe, Number, Record, Text, Vector, Vectors, fields_of
+from rtcore.fields import Choice, Color, FieldError, Flag, Maybe, Number, Numbers, Record, Text, Vector, Vectors, fields_of
 from rtcore.files import FileError, WriteError
 from rtcore.files import _yaml as yaml
 from rtcore.files._yamlout import dump
 from rtcore.lights import LIGHTS, Ambient, Point
 from rtcore.scene import MOST_NESTED, TRANSFORMS, Background, Fog, Material, Node, Rows, Scene, Translate
 from rtcore.shapes import SHAPES, Box, Mesh, Sphere
+from rtcore.shapes.polyhedron import Planes
 from rtcore.shapes.triangle import Array
 
 HEAD = "rayscope: 1\n"
@@ -59,7 +60,8 @@ def values(field):
         Vectors: lambda: st.lists(st.tuples(finite, finite, finite), min_size=field.least, max_size=field.least + 3),
         Maybe: lambda: st.none() if type(field.inner) not in KNOWN else st.none() | values(field.inner),
         Rows: lambda: st.tuples(*[st.tuples(*[finite] * 4)] * 3).map(lambda rows: (*rows, (0, 0, 0, 1))),
-        Array: lambda: st.none(),
+        Array: lambda: st.none(), Numbers: lambda: st.tuples(*[finite] * field.count),
+        Planes: lambda: st.lists(st.tuples(st.tuples(finite, finite, finite), st.tuples(finite, finite, finite)), min_size=1, max_size=3),
     }[type(field)]()
 
 

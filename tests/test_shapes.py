@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Scene, Sphere, Triangle
+from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus, Triangle
 from rtcore.shapes import SHAPES
 
 from naive import crossings, mp, nearest, vector
@@ -35,6 +35,13 @@ EXAMPLES = {
     "cone": Cone((0.1, -1, 0), 0.9, (0, 1, 0.2)),
     "frustum": Cone((0, 0, -0.75), 0.4, (0, 0, 0.75), 0.9),
     "funnel": Cone((-1, 0, 0), 0.0, (1, 0.2, 0), 1.0, capped=False),
+    "saddle": Quadric((1, -0.7, 0, 0.2, 0, 0, 0, 0, -1, 0.1), (-1, -1, -1), (1, 1.2, 1)),
+    "hyperboloid": Quadric((1, 1.5, -0.8, 0, 0.1, 0, 0, 0.2, 0, -0.25)),
+    "torus": Torus(0.9, 0.35),
+    "spindle": Torus(0.4, 0.7),
+    "gem": Polyhedron([((0, 0, 1), (0.1, 0, 1)), ((0, 0, -1), (0, 0.2, -1)), ((0.7, 0, 0), (1, 0.3, 0.4)), ((-0.8, 0, 0), (-1, 0.2, 0.1)),
+                       ((0, 0.9, 0), (0.2, 1, 0)), ((0, -0.6, 0), (0, -1, 0.3))]),
+    "wedge": Polyhedron([((0, 0.2, 0), (0.5, 1, 0)), ((0, -0.4, 0), (0.2, -1, 0.3))]),
 }
 
 
@@ -191,7 +198,7 @@ def test_texture_coordinates(name, precision):
     hits = rtcore.intersect(scene, origins, directions, precision=precision)
     uv = hits.uv[np.isfinite(hits.t)]
     assert np.isfinite(uv).all()
-    if name not in ("plane", "polygon"):    # those count in scene units
+    if name not in ("plane", "polygon", "gem", "wedge", "saddle", "hyperboloid"):    # those count in scene units
         assert uv.min() >= -1e-6 and uv.max() <= 1 + 1e-6
         assert (uv.max(0) - uv.min(0) > 0.5).all()
     assert (hits.normal[~np.isfinite(hits.t)] == 0).all() and (hits.uv[~np.isfinite(hits.t)] == 0).all()

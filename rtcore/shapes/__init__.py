@@ -3,10 +3,13 @@ from rtcore.shapes.box import BOX, Box
 from rtcore.shapes.cone import CONE, Cone, Cylinder
 from rtcore.shapes.plane import PLANE, Plane
 from rtcore.shapes.polygon import POLYGON, Polygon
+from rtcore.shapes.polyhedron import OPEN_POLYHEDRON, POLYHEDRON, Polyhedron
+from rtcore.shapes.quadric import OPEN_QUADRIC, QUADRIC, Quadric
 from rtcore.shapes.sphere import ELLIPSOID, SPHERE, Sphere
+from rtcore.shapes.torus import TORUS, Torus
 from rtcore.shapes.triangle import TRIANGLE, Mesh, Triangle
 
-SHAPES = (Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone)
+SHAPES = (Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone, Quadric, Torus, Polyhedron)
 
 #: Every kind of primitive that a shape can become.
-KINDS = (SPHERE, ELLIPSOID, PLANE, TRIANGLE, POLYGON, BOX, CONE)
+KINDS = (SPHERE, ELLIPSOID, PLANE, TRIANGLE, POLYGON, BOX, CONE, QUADRIC, OPEN_QUADRIC, TORUS, POLYHEDRON, OPEN_POLYHEDRON)

@@ -1,0 +1,175 @@
+"""Polyhedron: a solid bounded by planes, by the notes' rule: a ray is inside from the last plane it enters to the first it leaves."""
+import itertools
+from typing import Annotated
+
+import numpy as np
+
+from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.fields import Field, FieldError, Vec, Vector
+from rtcore.jit import inline, kernel
+from rtcore.lanes import dot, greatest, least, load, load3, select, splat3
+from rtcore.scene import Shape, invertible
+from rtcore.shapes.kind import Kind, Packed, hit_from, put_surface
+from rtcore.wave import DX, OX, START, record
+
+MOST_PLANES = 64
+LOW, HIGH, FIRST, COUNT = 3, 6, 9, 10       # columns after the centre
+
+
+class Planes(Field):
+    """A list of (point, outward normal)."""
+
+    def take(self, value):
+        if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
+            raise FieldError("a list of planes: [point, normal] each", value)
+        result = []
+        for i, plane in enumerate(value):
+            try:
+                point, normal = plane
+            except (TypeError, ValueError):
+                raise FieldError("a plane: [point, normal]", plane, f"[{i}]") from None
+            try:
+                result.append((Vector().take(point), Vector(nonzero=True).take(normal)))
+            except FieldError as error:
+                raise error.inside(f"[{i}]") from None
+        if not 1 <= len(result) <= MOST_PLANES:
+            raise FieldError(f"1 to {MOST_PLANES} planes", len(result))
+        return tuple(result)
+
+
+class Polyhedron(Shape, frozen=True):
+    """What lies behind all `planes`, each a point and a normal that points outward. It may be unbounded, but not empty."""
+
+    planes: Annotated[tuple[tuple[Vec, Vec], ...], Planes(help="point and outward normal of each plane")]
+
+    def check(self):
+        if extent(*half_spaces(self.planes, np.eye(4))) is None:
+            raise FieldError("planes with room behind all of them", [list(p) for p in self.planes], "planes")
+
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return POLYHEDRON if bounded(half_spaces(self.planes, np.eye(4))[1]) else OPEN_POLYHEDRON
+
+    def pack(self, matrix: np.ndarray) -> Packed:
+        points, normals = half_spaces(self.planes, matrix)
+        low, high = extent(points, normals)
+        # heights of the planes above a point inside: small numbers for a small solid, wherever it is
+        center = low / 2 + high / 2 if bounded(normals) else points[0]
+        heights = ((points - center) * normals).sum(1)
+        row = np.array([[*center, *low, *high, 0.0, len(points)]])
+        return Packed(self.kind(matrix), row, np.column_stack([normals, heights, np.zeros((len(points), 5))]))
+
+
+def half_spaces(planes, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and unit outward normals (n, 3) under a 4 x 4 matrix."""
+    points = np.array([p for p, _ in planes]) @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = np.array([n for _, n in planes])
+    normals = (normals / np.abs(normals).max(1, keepdims=True)) @ invertible(matrix)[:3, :3]
+    normals /= np.abs(normals).max(1, keepdims=True)
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def bounded(normals: np.ndarray) -> bool:
+    """Whether no direction leads away from all planes' fronts for ever: the edges of the cone of such directions are crossings of two
+    planes, so those are tried."""
+    if np.linalg.matrix_rank(normals, tol=1e-12) < 3:
+        return False
+    edges = np.array([np.cross(a, b) for a, b in itertools.combinations(normals, 2)])
+    lengths = np.linalg.norm(edges, axis=1, keepdims=True)
+    edges = (edges / np.where(lengths > 0, lengths, 1))[lengths[:, 0] > 1e-12]
+    edges = np.concatenate([edges, -edges])
+    return not (edges @ normals.T <= 1e-12).all(1).any()
+
+
+def extent(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Low and high corner of the solid, cut off far outside where it is unbounded; None if it is empty. By its vertices: the
+    crossings of three planes that lie behind all others."""
+    middle = points.mean(0)
+    far = 1e4 * max(np.abs(points - middle).max(), 1e-3 * np.abs(points).max(), 1e-100)
+    box = np.concatenate([np.eye(3), -np.eye(3)])
+    normals = np.concatenate([normals, box])
+    heights = np.concatenate([((points - middle) * normals[:len(points)]).sum(1), np.full(6, far)])
+    triples = np.array(list(itertools.combinations(range(len(normals)), 3)))
+    systems = normals[triples]
+    sound = np.abs(np.linalg.det(systems)) > 1e-12
+    vertices = np.linalg.solve(systems[sound], heights[triples[sound]][:, :, None])[:, :, 0]
+    inside = (vertices @ normals.T <= heights + 1e-9 * np.abs(vertices).max(1, keepdims=True)).all(1)
+    if not inside.any():
+        return None
+    low, high = vertices[inside].min(0), vertices[inside].max(0)
+    pad = 1e-9 * (high - low).max()
+    return middle + low - pad, middle + high + pad
+
+
+@inline
+def hit_solid(rays, i, p, data, q, extra, side, opacity):
+    """Eight rays against solid q."""
+    o, d = load3(rays.ray, OX, i) - splat3(data, q, 0), load3(rays.ray, DX, i)
+    start = load(rays.ray, START, i)
+    enter, leave = 0 * start - np.inf, 0 * start + np.inf
+    first = int(data[q, FIRST])
+    for k in range(first, first + int(data[q, COUNT])):
+        normal = splat3(extra, k, 0)
+        height = extra[k, 3] - dot(normal, o)       # how far behind the plane the ray starts
+        speed = dot(normal, d)
+        t = height / speed
+        # a ray along the plane is never behind it if it starts before it
+        enter = select(speed < 0, greatest(t, enter), select((speed == 0) & (height < 0), np.inf, enter))
+        leave = select(speed > 0, least(t, leave), leave)
+    if side == 0:
+        t = select(enter > start, enter, leave)
+    else:
+        t = enter if side & 1 else leave
+    record(rays, i, p, t, (enter <= leave) & (t < np.inf), opacity)
+
+
+@kernel
+def intersect(rays, n, tree, table, first, opacity):
+    walk = new_walk(rays)
+    for start in range(0, n, PACKET):
+        begin(walk, rays, start, n, tree)
+        node = next_leaf(walk, tree)
+        while node >= 0:
+            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                for g in range(PACKET // 8):
+                    if (walk.state[1] >> g) & 1:
+                        hit_solid(rays, start + g * 8, first + q, table.data, q, table.extra, table.side[q], opacity)
+            shrink(walk, rays, start)
+            node = next_leaf(walk, tree)
+
+
+@kernel
+def intersect_open(rays, n, tree, table, first, opacity):
+    for q in range(table.data.shape[0]):
+        for i in range(0, n, 8):
+            hit_solid(rays, i, first + q, table.data, q, table.extra, table.side[q], opacity)
+
+
+@kernel
+def surface(rays, n, out, table, first):
+    last = first + table.data.shape[0]
+    data, extra = table.data, table.extra
+    for i in range(n):
+        if first <= rays.prim[i] < last:
+            q = rays.prim[i] - first
+            cx, cy, cz = np.float64(data[q, 0]), np.float64(data[q, 1]), np.float64(data[q, 2])
+            x, y, z = hit_from(rays, i, cx, cy, cz)
+            # the face is the plane that the point is nearest to; the point is put onto it
+            best, off, reach = 0, -np.inf, 0.0
+            for k in range(int(data[q, FIRST]), int(data[q, FIRST] + data[q, COUNT])):
+                h = extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, 3]
+                reach = max(reach, abs(np.float64(extra[k, 3])))
+                if h > off:
+                    best, off = k, h
+            nx, ny, nz = np.float64(extra[best, 0]), np.float64(extra[best, 1]), np.float64(extra[best, 2])
+            x, y, z = x - off * nx, y - off * ny, z - off * nz
+            u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
+            put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))) + reach)
+
+
+def _bounds(data, extra):
+    return data[:, LOW:LOW + 3], data[:, HIGH:HIGH + 3]
+
+
+_CORNER = tuple(((0.0, 0.0, 0.0), tuple(-float(i == k) for i in range(3))) for k in range(3))
+POLYHEDRON = Kind("polyhedron", intersect, surface, _bounds, (Polyhedron((*_CORNER, ((1, 0, 0), (1, 1, 1)))), ()), shared_extra=True)
+OPEN_POLYHEDRON = Kind("open-polyhedron", intersect_open, surface, None, (Polyhedron(_CORNER), ()), shared_extra=True)
