@@ -73,6 +73,12 @@ def _similarity(linear: bytes) -> float | None:
     return float(most * np.sqrt(square[0, 0]))
 
 
+def power_near(size):
+    """A power of two that brings numbers of this size near 1, where their squares neither overflow nor vanish; 1 for ordinary sizes."""
+    exponent = np.clip(np.frexp(size)[1], -1000, 1000)
+    return np.where(np.abs(exponent) > 24, np.ldexp(1.0, exponent), 1.0)
+
+
 #: Columns of a placed unit shape: centre c, rows of the matrix L with p_unit = L (p - c), rows of its inverse M, reach; a kind's own
 #: numbers follow.
 CENTER, INVERSE, FORWARD, REACH, OWN = 0, 3, 12, 21, 22

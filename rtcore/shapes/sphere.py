@@ -12,8 +12,8 @@ from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, load, load3, root, select, splat3, with_sign
 from rtcore.scene import Scale, Shape, invertible
-from rtcore.shapes.kind import (CENTER, Kind, Packed, forward, into, normalized, placed, placed_bounds, put_placed, put_surface,
-                                similarity, unit_hit)
+from rtcore.shapes.kind import (CENTER, Kind, Packed, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
+                                put_surface, similarity, unit_hit)
 from rtcore.wave import DX, OX, START, T, record
 
 
@@ -30,21 +30,23 @@ class Sphere(Shape, frozen=True):
         scale = similarity(matrix)
         center = matrix[:3, :3] @ self.center + matrix[:3, 3]
         if scale is not None:
-            return Packed(SPHERE, np.array([[*center, scale * self.radius]]))
+            radius = scale * self.radius
+            return Packed(SPHERE, np.array([[*center, radius, power_near(radius)]]))
         local = matrix @ np.diag([self.radius] * 3 + [1.0])
         local[:3, 3] = center
         return Packed(ELLIPSOID, placed(local, invertible(local))[None])
 
 
 @inline
-def hit_ball(rays, i, p, f, d, radius, side, opacity):
-    """Eight rays f + t d against the sphere of the radius about the origin. f, d: Vec3 of lanes; radius: lanes or a number."""
+def hit_ball(rays, i, p, f, d, radius, power, side, opacity):
+    """Eight rays (f + t / power d) against the sphere of the radius about the origin. f, d: Vec3 of lanes; radius: lanes or a number."""
     square = dot(d, d)
     middle = -dot(f, d) / square
     nearest = along(f, middle, d)
     half = root((radius * radius - dot(nearest, nearest)) / square)         # NaN where the ray misses: then nothing below is true
     far = middle + with_sign(half, middle)
     near = (dot(f, f) - radius * radius) / (square * far)
+    near, far = near * power, far * power
     enter, leave = select(middle > 0, near, far), select(middle > 0, far, near)
     if side == 0:
         t = select(enter > load(rays.ray, START, i), enter, leave)
@@ -61,12 +63,13 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
-                center = splat3(table.data, q, 0)
+                center, power = splat3(table.data, q, 0), table.data[q, 4]
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
                         d = load3(rays.ray, DX, i)
-                        hit_ball(rays, i, first + q, load3(rays.ray, OX, i) - center, d, table.data[q, 3] + 0 * d.x, table.side[q], opacity)
+                        f = (load3(rays.ray, OX, i) - center) * (1 / power)
+                        hit_ball(rays, i, first + q, f, d, table.data[q, 3] / power + 0 * d.x, power, table.side[q], opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -106,7 +109,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         f = into(table.data, q, load3(rays.ray, OX, i) - splat3(table.data, q, CENTER))
                         d = into(table.data, q, load3(rays.ray, DX, i))
-                        hit_ball(rays, i, first + q, f, d, 1 + 0 * d.x, table.side[q], opacity)
+                        hit_ball(rays, i, first + q, f, d, 1 + 0 * d.x, 1, table.side[q], opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
