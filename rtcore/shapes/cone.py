@@ -12,7 +12,7 @@ from rtcore.fields import FieldError, Flag, Number, Vec, Vector
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, load, load3, root, select, splat3, vec3, with_sign
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, put_placed, unit_hit
+from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, around, forward, into, placed, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
 
 BASE, SLOPE, CAPPED = OWN, OWN + 1, OWN + 2
@@ -144,7 +144,7 @@ def surface(rays, n, out, table, first):
                 z = 0.0 if below < above else 1.0
                 put_placed(out, i, data, q, x, y, z, 0.0, 0.0, 2 * z - 1, (x + 1) / 2, (y + 1) / 2)
             else:
-                u = np.arctan2(y, x) / (2 * np.pi) % 1.0
+                u = around(out, y, x)
                 if off > 0 and radius > 0:
                     x, y = x / off * radius, y / off * radius
                     put_placed(out, i, data, q, x, y, z, x / radius, y / radius, -slope, u, z)

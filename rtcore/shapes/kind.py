@@ -174,6 +174,12 @@ def normalized(x, y, z):
 # --- the surface rows ---
 
 @inline
+def around(out, y, x):
+    """The angle of (x, y) as 0 .. 1; 0 where `out` has no rows for texture coordinates."""
+    return np.arctan2(y, x) / (2 * np.pi) % 1.0 if out.shape[0] > U else 0.0
+
+
+@inline
 def put_surface(out, i, px, py, pz, nx, ny, nz, u, v, reach):
     """Fill column i: point, unit normal (geometric and shading), texture coordinates; the point's error is bounded by 8 roundings
     of the largest number it was made from: its own coordinates, or `reach`."""
@@ -182,5 +188,6 @@ def put_surface(out, i, px, py, pz, nx, ny, nz, u, v, reach):
     out[GX, i], out[GY, i], out[GZ, i] = nx, ny, nz
     out[NX, i], out[NY, i], out[NZ, i] = nx, ny, nz
     out[ERR, i] = eps * max(reach, max(abs(px), max(abs(py), abs(pz))))
-    out[U, i], out[V, i] = u, v
+    if out.shape[0] > U:
+        out[U, i], out[V, i] = u, v
 

@@ -12,7 +12,8 @@ from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, fma, load, load3, root, select, splat3, vec3, with_sign
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, normalized, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes.kind import (CENTER, FRONT, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, put_placed,
+                                unit_hit)
 from rtcore.wave import DX, OX, START, record
 
 LOW, HIGH = OWN + 10, OWN + 13
@@ -145,7 +146,7 @@ def surface(rays, n, out, table, first):
                 step = value / square if square > 1e-12 and abs(value) < 0.01 * square else 0.0
                 x, y, z = x - step * gx, y - step * gy, z - step * gz
             nx, ny, nz = normalized(gx, gy, gz)
-            put_placed(out, i, data, q, x, y, z, nx, ny, nz, np.arctan2(y, x) / (2 * np.pi) % 1.0, z)
+            put_placed(out, i, data, q, x, y, z, nx, ny, nz, around(out, y, x), z)
 
 
 def _bounds(data, extra):

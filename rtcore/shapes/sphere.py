@@ -12,9 +12,9 @@ from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, load, load3, root, select, splat3, with_sign
 from rtcore.scene import Scale, Shape, invertible
-from rtcore.shapes.kind import (CENTER, Kind, Packed, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
+from rtcore.shapes.kind import (CENTER, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, similarity, unit_hit)
-from rtcore.wave import DX, OX, START, T, record
+from rtcore.wave import DX, OX, START, T, U, record
 
 
 class Sphere(Shape, frozen=True):
@@ -86,14 +86,14 @@ def surface(rays, n, out, table, first):
             nx, ny, nz = normalized(rays.ray[OX, i] + t * rays.ray[DX, i] - cx, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - cy,
                                     rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - cz)
             # the point is brought back onto the sphere: its error does not grow with the distance of the eye
-            put_surface(out, i, cx + r * nx, cy + r * ny, cz + r * nz, nx, ny, nz, *globe(nx, ny, nz),
+            put_surface(out, i, cx + r * nx, cy + r * ny, cz + r * nz, nx, ny, nz, *globe(out, nx, ny, nz),
                         max(abs(cx), max(abs(cy), abs(cz))) + r)
 
 
 @inline
-def globe(x, y, z):
+def globe(out, x, y, z):
     """Longitude and latitude of a unit vector, each 0 .. 1; the poles are on z."""
-    return np.arctan2(y, x) / (2 * np.pi) % 1.0, np.arccos(min(max(-z, -1.0), 1.0)) / np.pi
+    return around(out, y, x), np.arccos(min(max(-z, -1.0), 1.0)) / np.pi if out.shape[0] > U else 0.0
 
 
 @kernel
@@ -121,7 +121,7 @@ def surface_ellipsoid(rays, n, out, table, first):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
             x, y, z = normalized(*unit_hit(rays, i, table.data, q))
-            u, v = globe(x, y, z)
+            u, v = globe(out, x, y, z)
             put_placed(out, i, table.data, q, x, y, z, x, y, z, u, v)
 
 

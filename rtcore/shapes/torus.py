@@ -17,7 +17,7 @@ from rtcore.fields import Number
 from rtcore.jit import inline, kernel
 from rtcore.lanes import along, any_lane, dot, fma, greatest, least, load, load3, root, select, size, splat3
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, around, forward, into, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
 
 MAJOR, MINOR = OWN, OWN + 1
@@ -174,7 +174,7 @@ def surface(rays, n, out, table, first):
                 nx, ny, nz = nx / length, ny / length, nz / length
             else:
                 nx, ny, nz = 0.0, 0.0, 1.0
-            u, v = np.arctan2(y, x) / (2 * np.pi) % 1.0, np.arctan2(z, off - major) / (2 * np.pi) % 1.0
+            u, v = around(out, y, x), around(out, z, off - major)
             put_placed(out, i, data, q, cx + minor * nx, cy + minor * ny, minor * nz, out_ * nx, out_ * ny, out_ * nz, u, v)
 
 
