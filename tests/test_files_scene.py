@@ -242,7 +242,7 @@ WRONG = {
     HEAD + "scene: " + "[{group: " * 220 + "[]" + "}]" * 220:
         "line 2: scene[0].group[0].group[0].group[0].group[0].group[0].group[ ... ].group[0].group[0].group[0].group[0]",
     HEAD + "scene: " + "[" * 100_000: "line 2: expected at most 500 mappings and lists inside one another, got more",
-    HEAD + "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{','.join(['*' + a] * 9)}]\n" for a, b in zip("abcdefg", "bcdefgh")):
+    HEAD + "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(f"{b}: &{b} [{','.join(['*' + a] * 9)}]\n" for a, b in zip("abcdef", "bcdefg")):
         "line 8: expected aliases that stand for at most 1,000,000 values in all, got more",
     HEAD + "scene: &a [*a]\n": "line 2: expected an alias of something that is complete by then, got *a",
     HEAD + "name: a\nname: b\nscene: []\n": "line 3: expected each word once, got 'name' a second time",
