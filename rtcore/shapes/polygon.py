@@ -22,8 +22,11 @@ class Polygon(Shape, frozen=True):
 
     def check(self):
         points = np.array(self.vertices)
-        size = np.abs(points - points[0]).max()
-        normal = newell(points)
+        with np.errstate(over="ignore", invalid="ignore"):
+            size = np.abs(points - points[0]).max()
+            normal = newell(points)
+        if not np.isfinite(size):
+            raise FieldError("corners less than 1e308 apart", self.vertices, "vertices")
         if not size > 0 or not np.linalg.norm(normal) > 1e-14:
             raise FieldError("corners that span an area", self.vertices, "vertices")
         heights = ((points - points.mean(0)) / size) @ (normal / np.linalg.norm(normal))
