@@ -67,7 +67,8 @@ def render(scene: Scene, size: tuple[int, int] = (640, 480), spp: int = 1, **set
 def intersect(scene: Scene, origins, directions, t_min=0.0, t_max=math.inf, precision: str = "f64", threads: int | None = None) -> Hits:
     """Nearest hits of N rays with t_min < t < t_max.
 
-    origins, directions: (N, 3); directions of any length other than 0, t counts in their lengths. t_min and t_max: a number or (N,).
+    origins, directions: (N, 3); directions of any length other than 0, t counts in their lengths. t_min (of at least 0) and t_max: a
+    number or (N,).
     precision "f64" or "f32", threads None for one per core. Raises FieldError for arrays of another shape or numbers that are not finite.
     """
     rays, stretch, geometry, n = _rays(scene, origins, directions, t_min, t_max, precision)
@@ -85,7 +86,8 @@ def intersect(scene: Scene, origins, directions, t_min=0.0, t_max=math.inf, prec
     _share(trace, rays.ray.shape[1], threads)
     hit = rays.prim[:n] >= 0
     node = np.where(hit, geometry.leaf[rays.prim[:n]] if len(geometry.leaf) else -1, -1)
-    t = np.where(hit, rays.ray[T, :n] * stretch, np.inf).astype(geometry.dtype)
+    with np.errstate(over="ignore"):    # a hit beyond all numbers of the type
+        t = np.where(hit, rays.ray[T, :n] * stretch, np.inf).astype(geometry.dtype)
     return Hits(t, node.astype(np.int32), np.ascontiguousarray(surface[GX:GX + 3, :n].T), np.ascontiguousarray(surface[U:U + 2, :n].T))
 
 
@@ -122,12 +124,21 @@ def _rays(scene, origins, directions, t_min, t_max, precision) -> tuple[Rays, np
     rays.ray[DX:DX + 3, :n] = np.ldexp(d, -exponent[:, None]).T
     with np.errstate(over="ignore"):
         stretch = np.ldexp(np.ones(n), -exponent)
-        for row, bound in ((START, t_min), (T, t_max)):
-            bound = np.broadcast_to(np.asarray(bound, np.float64), (n,))
-            if np.isnan(bound).any():
-                raise FieldError("a number", math.nan, "t_min" if row == START else "t_max")
-            rays.ray[row, :n] = bound / stretch
+        rays.ray[START, :n] = _bound(t_min, "t_min", n, 0.0) / stretch
+        rays.ray[T, :n] = _bound(t_max, "t_max", n, -math.inf) / stretch
     return rays, stretch, geometry, n
+
+
+def _bound(value, name: str, n: int, least: float) -> np.ndarray:
+    """A number or (n,) as (n,), none NaN or below `least`."""
+    try:
+        bound = np.broadcast_to(np.asarray(value, np.float64), (n,))
+    except (TypeError, ValueError):
+        raise FieldError(f"a number or an array ({n},)", value, name) from None
+    bad = bound[~(bound >= least)]
+    if len(bad):
+        raise FieldError("a number" if least == -math.inf else f"a number of at least {least:g}", float(bad[0]), name)
+    return bound
 
 
 def _points(array, name: str, dtype) -> np.ndarray:

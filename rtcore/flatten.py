@@ -86,11 +86,6 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
     data = np.concatenate([p.data for _, p in packs])
     lengths = [len(p.data) for _, p in packs]
     owner = np.repeat(np.array([index for index, _ in packs], np.int32), lengths)
-    with np.errstate(over="ignore"):
-        wild = owner[~np.isfinite(data.astype(dtype)).all(axis=1)]
-    if len(wild):
-        leaf = leaves[wild[0]]
-        raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
     side = np.repeat(np.array([SIDES[leaves[index].shape.sides] + (MIRRORED if p.mirrored else 0) for index, p in packs], np.int8), lengths)
     extra = np.zeros((0, 3 if kind.shared_extra else 9))
     if kind.shared_extra:
@@ -99,6 +94,12 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
     elif any(p.extra is not None for _, p in packs):
         # a row of zeros says: flat
         extra = np.concatenate([p.extra if p.extra is not None else np.zeros((len(p.data), 9)) for _, p in packs])
+    outline = np.repeat([index for index, _ in packs], [len(p.extra) for _, p in packs]) if kind.shared_extra else owner
+    with np.errstate(over="ignore"):
+        wild = [of[~np.isfinite(a.astype(dtype)).all(axis=1)] for a, of in ((data, owner), (extra, outline)) if len(a)]
+    if any(map(len, wild)):
+        leaf = leaves[np.concatenate(wild)[0]]
+        raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
     tree, has_tree = EMPTY_TREE, False
     if kind.bounds is not None and len(data):
         # bounds of the numbers that the kernel will see

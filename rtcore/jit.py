@@ -26,6 +26,7 @@ from numba import config, njit
 
 PACKAGE = Path(__file__).parent
 KEEP_DAYS = 30
+_in_use: set[Path] = set()      # cache folders of this process
 
 
 def _writable(folder: Path) -> bool:
@@ -77,14 +78,18 @@ def fingerprint(module: str) -> str:
 
 def cache_folder(module: str) -> Path:
     """The cache folder of one module's kernels."""
-    return cache_root() / f"{module.removeprefix('rtcore.')}-{fingerprint(module)}"
+    folder = cache_root() / f"{module.removeprefix('rtcore.')}-{fingerprint(module)}"
+    _in_use.add(folder)
+    return folder
 
 
 def prune() -> None:
-    """Remove kernel folders that nothing has used for a month."""
+    """Remove kernel folders that no process has used for a month; reading a kernel leaves no trace in a folder's time, so this does."""
     for folder in cache_root().iterdir():
         try:
-            if time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
+            if folder in _in_use:
+                os.utime(folder)
+            elif time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
                 shutil.rmtree(folder, ignore_errors=True)
         except OSError:
             continue    # another process was quicker

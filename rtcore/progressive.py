@@ -20,7 +20,7 @@ try:
 except ImportError:     # Windows
     resource = None
 
-from rtcore import film as films, warm
+from rtcore import film as films
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
 from rtcore.plan import VIEW, Plan, plan
@@ -235,7 +235,8 @@ class Renderer:
         composed = self._planned[2]
         needed = [name for name in composed.kernels if name not in self._kernels]
         if needed:
-            warm.compile_kernels(needed)
+            from rtcore.warm import compile_kernels     # not at the top: `python -m rtcore.warm` must not find itself imported already
+            compile_kernels(needed)
             self._kernels.update(needed)
         return composed
 

@@ -66,6 +66,8 @@ def similarity(matrix: np.ndarray) -> float | None:
 def _similarity(linear: bytes) -> float | None:
     m = np.frombuffer(linear).reshape(3, 3)
     most = np.abs(m).max()
+    if not 0 < most < np.inf:
+        return None
     m = m / most        # so that no square overflows or underflows
     square = m.T @ m
     if np.abs(square - square[0, 0] * np.eye(3)).max() > 4 * np.finfo(float).eps * square[0, 0]:

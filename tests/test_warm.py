@@ -1,0 +1,145 @@
+"""Warming: what is missing is told, what is told is compiled, and nothing else is compiled afterwards."""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rtcore.warm import ALL, GROUPS, compile_kernels
+
+ROOT = Path(__file__).parent.parent
+
+#: In a fresh process with an empty cache.
+COLD = """
+import rtcore
+from rtcore.settings import Settings
+from rtcore.warm import compile_kernels, missing
+scene = rtcore.Scene(objects=[rtcore.Plane((0, 0, 0), (0, 1, 0))], lights=[], camera=rtcore.Camera(lookfrom=(0, 1, -5)))
+settings = Settings(size=(16, 8), precision="f32")
+assert missing(scene, settings) == ["core.f32", "plane.f32"], missing(scene, settings)
+steps = []
+compile_kernels(missing(scene, settings), lambda *step: steps.append(step))
+assert steps == [(0, 2, "core.f32"), (1, 2, "plane.f32"), (2, 2, "")], steps
+assert missing(scene, settings) == []
+assert missing(scene, Settings(precision="f64")) == ["core.f64", "plane.f64"]
+print("well")
+"""
+
+#: Everything is warmed, then everything is rendered: no kernel may gain a signature, nor compile.
+WARM = """
+import sys
+import numba
+import rtcore
+from rtcore import *
+from rtcore.settings import Settings
+from rtcore.shapes import KINDS
+from rtcore.warm import ALL, compile_kernels, missing
+
+def kernels():
+    found = {}
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] == "rtcore":
+            for word, value in vars(module).items():
+                if isinstance(value, numba.core.dispatcher.Dispatcher) and value.targetoptions.get("forceinline") is None:
+                    found[value.py_func.__module__ + "." + value.py_func.__name__] = value
+    return found
+
+compile_kernels(ALL)
+before = {name: (tuple(k.signatures), sum(k.stats.cache_misses.values())) for name, k in kernels().items()}
+assert len(before) > 20, before
+assert all(signatures for signatures, _ in before.values()), before
+
+glass = Material(diffuse=0.2, reflection=1, transmission=0.8, fresnel=True, checker=Checker())
+flat = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)] * 6)
+smooth = Mesh(flat.vertices, flat.faces, normals=[(0, 0, 1)] * 4)
+lights = [Point(position=(0, 9, 0)), Point(position=(1, 9, 0), falloff="constant"), Directional(direction=(1, -1, 0)), Ambient()]
+for precision in ("f64", "f32"):
+    for fog in (None, Fog(), Fog(kind="linear"), Fog(kind="exponential-squared")):
+        for mesh in (flat, smooth):
+            nodes = [Node(shape=k.example[0], transform=k.example[1], material=m) for k in KINDS for m in (glass, None)]
+            scene = Scene(objects=[*nodes, mesh, *(Sphere((i, 0, 0), 0.2) for i in range(9))], lights=lights, fog=fog,
+                          background=Background(top=(1, 1, 1)))
+            assert missing(scene, Settings(precision=precision)) == []
+            image = rtcore.render(scene, (24, 16), 2, precision=precision, error=1e-9)
+            assert image.stats["rays"]["refraction"] > 0
+    for view in ("normal", "depth", "object"):
+        rtcore.render(scene, (24, 16), precision=precision, view=view)
+    hits = rtcore.intersect(scene, [(0, 0, -5)] * 20, [(0, 0, 1)] * 20, precision=precision)
+    rtcore.occluded(scene, [(0, 0, -5)], [(0, 0, 1)], precision=precision)
+rtcore.render(Scene(), (24, 16))
+image._repr_png_()
+for name, kernel in kernels().items():
+    signatures, misses = before[name]
+    assert tuple(kernel.signatures) == signatures, ("a signature more", name, kernel.signatures)
+    assert sum(kernel.stats.cache_misses.values()) == misses, ("compiled", name)
+print("well")
+"""
+
+
+def python(*arguments, cache=None):
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    if cache is not None:
+        env["RAYSCOPE_CACHE"] = str(cache)
+    return subprocess.run([sys.executable, *arguments], env=env, cwd=ROOT, capture_output=True, text=True, timeout=280)
+
+
+def test_missing_and_compile(tmp_path):
+    run = python("-c", COLD, cache=tmp_path)
+    assert run.returncode == 0 and run.stdout == "well\n", run.stderr
+    assert any(tmp_path.rglob("*.nbi"))     # it went where it was told
+    # a second process finds it
+    again = python("-c", COLD, cache=tmp_path)
+    assert again.returncode == 1 and "AssertionError: []" in again.stderr
+
+
+def test_nothing_compiles_once_all_is_warm():
+    """With the user's own cache, where most of it is already: what counts is that a render adds nothing."""
+    run = python("-W", "error", "-c", WARM)
+    assert run.returncode == 0 and run.stdout == "well\n", run.stderr
+
+
+def test_helper_process_tells_its_progress(tmp_path):
+    run = python("-W", "error", "-m", "rtcore.warm", "fog.f32", "light-directional.f32", cache=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.splitlines() == ["0 2 fog.f32", "1 2 light-directional.f32", "2 2 "]
+    assert run.stderr == ""
+
+
+def test_helper_process_refuses_unknown_names(tmp_path):
+    run = python("-m", "rtcore.warm", "fog.f32", "fog.f16", "banana", cache=tmp_path)
+    assert run.returncode == 2 and run.stdout == ""
+    assert [line for line in run.stderr.splitlines() if "banana" in line] == ["rtcore.warm: no kernels are called fog.f16, banana"]
+    assert not any(tmp_path.rglob("*.nbi"))     # nothing was compiled before the mistake was found
+
+
+def test_unknown_name_is_a_key_error():
+    with pytest.raises(KeyError):
+        compile_kernels(["banana.f64"])
+
+
+def test_all_is_every_group_in_both_precisions():
+    assert {f"{group}.{precision}" for group in GROUPS for precision in ("f32", "f64")} == set(ALL) and len(ALL) == len(set(ALL))
+
+
+def test_a_stale_folder_of_this_very_version_is_not_pruned(tmp_path):
+    """Kernels in use for longer than the time to keep must not be taken from under a marker that says they are there."""
+    code = ("import os, rtcore\nfrom rtcore import jit, warm\nfrom rtcore.settings import Settings\n"
+            "warm.compile_kernels(['fog.f32', 'plane.f32'])\n"
+            "folder = jit.cache_folder('rtcore.fog')\nos.utime(folder, (1, 1))\nprint(folder)\n")
+    first = python("-c", code, cache=tmp_path)
+    assert first.returncode == 0, first.stderr
+    again = python("-c", "import rtcore\nfrom rtcore import jit, warm\nwarm.compile_kernels(['plane.f32'])\n", cache=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert list(Path(first.stdout.strip()).rglob("*.nbi"))
+
+
+def test_old_folders_of_other_versions_are_pruned(tmp_path):
+    old = tmp_path / "kernels" / "fog-0123456789abcdef"
+    old.mkdir(parents=True)
+    (old / "x.nbi").write_text("")
+    os.utime(old, (1, 1))
+    fresh = tmp_path / "kernels" / "fog-fedcba9876543210"
+    fresh.mkdir()
+    assert python("-m", "rtcore.warm", "plane.f32", cache=tmp_path).returncode == 0
+    assert fresh.exists() and not old.exists()
