@@ -87,7 +87,8 @@ CASES = {
 LOST = {"tiny triangle", "tiny triangle in f64"}
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.xfail(n in LOST, reason="products vanish", strict=True)) for n in CASES])
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.xfail(name in LOST, reason="products vanish", strict=True)) for name in CASES])
 def test_case(name):
     case = CASES[name]
     dtype = {"f64": np.float64, "f32": np.float32}[case.precision]

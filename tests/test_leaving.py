@@ -153,7 +153,7 @@ def test_error_bound_covers_the_error(precision):
         p = surface[PX:PX + 3].astype(np.longdouble)
         row = geometry.groups[0].table.data[0].astype(np.longdouble)
         if isinstance(shape, Sphere):
-            off = np.abs(np.sqrt(((p - row[:3, None]) ** 2).sum(0)) - row[3])
+            off = np.abs(np.sqrt(((p - row[:3, None]) ** 2).sum(0)) - row[3] * row[4])
         else:
             off = np.abs(((p - row[:3, None]) * row[3:6, None]).sum(0))
         assert (off <= surface[ERR]).all()

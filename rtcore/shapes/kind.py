@@ -76,8 +76,9 @@ def _similarity(linear: bytes) -> float | None:
 
 
 def power_near(size):
-    """A power of two that brings numbers of this size near 1, where their squares neither overflow nor vanish; 1 for ordinary sizes."""
-    exponent = np.clip(np.frexp(size)[1], -1000, 1000)
+    """A power of two that brings numbers of this size near 1, where their squares neither overflow nor vanish; 1 for ordinary sizes.
+    It and its inverse are float32 numbers wherever `size` is one."""
+    exponent = np.clip(np.frexp(size)[1], -120, 1000)
     return np.where(np.abs(exponent) > 24, np.ldexp(1.0, exponent), 1.0)
 
 

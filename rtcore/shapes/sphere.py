@@ -31,7 +31,8 @@ class Sphere(Shape, frozen=True):
         center = matrix[:3, :3] @ self.center + matrix[:3, 3]
         if scale is not None:
             radius = scale * self.radius
-            return Packed(SPHERE, np.array([[*center, radius, power_near(radius)]]))
+            power = power_near(radius)
+            return Packed(SPHERE, np.array([[*center, radius / power, power, 1 / power]]))
         local = matrix @ np.diag([self.radius] * 3 + [1.0])
         local[:3, 3] = center
         return Packed(ELLIPSOID, placed(local, invertible(local))[None])
@@ -68,8 +69,8 @@ def intersect(rays, n, tree, table, first, opacity):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
                         d = load3(rays.ray, DX, i)
-                        f = (load3(rays.ray, OX, i) - center) * (1 / power)
-                        hit_ball(rays, i, first + q, f, d, table.data[q, 3] / power + 0 * d.x, power, table.side[q], opacity)
+                        f = (load3(rays.ray, OX, i) - center) * table.data[q, 5]
+                        hit_ball(rays, i, first + q, f, d, table.data[q, 3] + 0 * d.x, power, table.side[q], opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -81,7 +82,7 @@ def surface(rays, n, out, table, first):
         p = rays.prim[i]
         if first <= p < last:
             q = p - first
-            t, r = np.float64(rays.ray[T, i]), np.float64(table.data[q, 3])
+            t, r = np.float64(rays.ray[T, i]), np.float64(table.data[q, 3]) * table.data[q, 4]
             cx, cy, cz = np.float64(table.data[q, 0]), np.float64(table.data[q, 1]), np.float64(table.data[q, 2])
             nx, ny, nz = normalized(rays.ray[OX, i] + t * rays.ray[DX, i] - cx, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - cy,
                                     rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - cz)
@@ -126,7 +127,8 @@ def surface_ellipsoid(rays, n, out, table, first):
 
 
 def _bounds(data, extra):
-    return data[:, :3] - data[:, 3:4], data[:, :3] + data[:, 3:4]
+    radius = data[:, 3:4] * data[:, 4:5]
+    return data[:, :3] - radius, data[:, :3] + radius
 
 
 def _bounds_ellipsoid(data, extra):
