@@ -112,11 +112,11 @@ def test_ray_into_a_closed_shape_comes_out(name, place, precision):
         return
     entering = (d * surface[GX:GX + 3]).sum(0) < -1e-3
     o, way, _ = spawn(surface[:, entering], np.full(entering.sum(), -1.0), rng, geometry.dtype)
-    level = np.arange(o.shape[1]) % 2 == 0      # these pass within a rounding of an edge
     again, _ = trace(geometry, o, way)
-    lost = (again.prim[:o.shape[1]] < 0) & ~level
-    # a start within an error bound of an edge may lie outside the neighbouring face
-    assert lost.mean() <= (2e-3 if precision == "f32" else 1e-6), lost.sum()
+    lost = again.prim[:o.shape[1]] < 0
+    # a start within an error bound of an edge may lie outside the neighbouring face: in float32 that bound is 1e-6 of the size, and
+    # a hundredth of it where a thing of size 1e-3 stands 11 from the origin
+    assert lost.mean() <= (0 if precision == "f64" else 5e-3 if place == "small and far" else 1e-4), lost.sum()
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])
