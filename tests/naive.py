@@ -11,7 +11,7 @@ from typing import NamedTuple
 import mpmath
 import numpy as np
 
-from rtcore import Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 mp = mpmath.MPContext()
 mp.dps = 50
@@ -212,8 +212,44 @@ def _polyhedron(s: Polyhedron, o, d):
                 yield t, normal
 
 
+def _blob(s: Blob, o, d):
+    """The ends of all elements' spheres cut the ray; between them the raw quartic's complex roots, where the field can reach at all."""
+    elements = [(vector(c), mp.mpf(r), mp.mpf(w)) for c, r, w in s.elements]
+    threshold, forms = mp.mpf(s.threshold), []
+    for center, radius, strength in elements:       # 1 - |p - center|²/radius² as a t² + 2 b t + c
+        f = sub(o, center)
+        forms.append((-dot(d, d) / radius ** 2, -dot(f, d) / radius ** 2, 1 - dot(f, f) / radius ** 2, strength))
+    spans = [(*sorted(ends), form) for form in forms if len(ends := quadratic(*form[:3])) == 2]
+    ends = sorted({end for low, high, _ in spans for end in (low, high)})
+    for low, high in zip(ends, ends[1:]):
+        active = [form for first, last, form in spans if first <= low and high <= last]
+        whole, most, least = [mp.mpf(0)] * 4 + [-threshold], -threshold, -threshold
+        for a, b, c, strength in active:
+            square = (a * a, 4 * a * b, 2 * a * c + 4 * b * b, 4 * b * c, c * c)
+            whole = [x + strength * y for x, y in zip(whole, square)]
+            at_ends = [((a * t + 2 * b) * t + c) ** 2 for t in (low, high)]
+            top = (c - b * b / a) ** 2 if low <= -b / a <= high else max(at_ends)
+            most, least = most + max(strength * top, strength * min(at_ends)), least + min(strength * top, strength * min(at_ends))
+        if most < 0 or least > 0:
+            continue
+        while whole[0] == 0:
+            whole.pop(0)
+        with warnings.catch_warnings():     # as for the torus
+            warnings.simplefilter("ignore", DeprecationWarning)
+            roots = mp.polyroots(whole, maxsteps=500, extraprec=400)
+        for root in roots:
+            t = mp.re(root)
+            if abs(mp.im(root)) <= mp.mpf(10) ** -20 * (1 + abs(root)) and low <= t < high:
+                normal = (mp.mpf(0),) * 3
+                for (center, radius, _), (a, b, c, strength) in zip(elements, forms):
+                    w = (a * t + 2 * b) * t + c
+                    if w > 0:
+                        normal = add(normal, times(strength * w / radius ** 2, sub(add(o, times(t, d)), center)))
+                yield t, normal
+
+
 TWINS = {Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone,
-         Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron}
+         Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron, Blob: _blob}
 
 
 # --- placed shapes ---

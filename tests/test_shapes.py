@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus, Triangle
+from rtcore import Blob, Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus, Triangle
 from rtcore.shapes import SHAPES
 
 from naive import crossings, mp, nearest, vector
@@ -42,6 +42,11 @@ EXAMPLES = {
     "gem": Polyhedron([((0, 0, 1), (0.1, 0, 1)), ((0, 0, -1), (0, 0.2, -1)), ((0.7, 0, 0), (1, 0.3, 0.4)), ((-0.8, 0, 0), (-1, 0.2, 0.1)),
                        ((0, 0.9, 0), (0.2, 1, 0)), ((0, -0.6, 0), (0, -1, 0.3))]),
     "wedge": Polyhedron([((0, 0.2, 0), (0.5, 1, 0)), ((0, -0.4, 0), (0.2, -1, 0.3))]),
+    "blob": Blob([((-0.5, 0.1, 0), 1, 1), ((0.5, -0.1, 0.2), 0.9, 1.2)], 0.35),
+    "bitten blob": Blob([((0.1, 0, 0), 1.3, 1), ((0.7, 0.6, 0.2), 1, -0.9)], 0.3),
+    "blob of eight": Blob([
+        ((0.3, -0.2, 0.7), 0.8, 1.1), ((-0.7, 0.5, 0.1), 0.7, 0.9), ((0.1, 0.6, -0.4), 0.8, 1.3), ((-0.2, -0.7, 0.2), 0.7, 1),
+        ((0.6, 0.3, 0.1), 0.6, 0.8), ((-0.4, -0.1, -0.6), 0.75, 1.2), ((0.5, -0.5, -0.3), 0.65, 1), ((-0.3, 0.2, 0.6), 0.7, 0.7)], 0.4),
 }
 
 

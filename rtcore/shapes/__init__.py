@@ -1,4 +1,5 @@
 """Shapes: one file each, with the authoring record, the packing into arrays, the kernel and the surface. Listed once, here."""
+from rtcore.shapes.blob import BLOB, Blob
 from rtcore.shapes.box import BOX, Box
 from rtcore.shapes.cone import CONE, Cone, Cylinder
 from rtcore.shapes.plane import PLANE, Plane
@@ -9,7 +10,7 @@ from rtcore.shapes.sphere import ELLIPSOID, SPHERE, Sphere
 from rtcore.shapes.torus import TORUS, Torus
 from rtcore.shapes.triangle import TRIANGLE, Mesh, Triangle
 
-SHAPES = (Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone, Quadric, Torus, Polyhedron)
+SHAPES = (Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone, Quadric, Torus, Polyhedron, Blob)
 
 #: Every kind of primitive that a shape can become.
-KINDS = (SPHERE, ELLIPSOID, PLANE, TRIANGLE, POLYGON, BOX, CONE, QUADRIC, OPEN_QUADRIC, TORUS, POLYHEDRON, OPEN_POLYHEDRON)
+KINDS = (SPHERE, ELLIPSOID, PLANE, TRIANGLE, POLYGON, BOX, CONE, QUADRIC, OPEN_QUADRIC, TORUS, POLYHEDRON, OPEN_POLYHEDRON, BLOB)

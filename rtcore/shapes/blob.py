@@ -1,0 +1,198 @@
+"""Blob: soft spheres that flow together (Wyvill, McPheeters and Wyvill, *Data Structure for Soft Objects*, 1986)."""
+from typing import Annotated
+
+import numpy as np
+
+from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.fields import Field, FieldError, Number, Vec, Vector
+from rtcore.jit import inline, kernel
+from rtcore.lanes import load
+from rtcore.scene import Shape, invertible
+from rtcore.shapes._blob import MOST_ELEMENTS, NOISE, PARTS, RADIUS, STRENGTH, X, Y, Z, meet, new_scratch, search
+from rtcore.shapes.kind import OWN, REACH, Kind, Packed, forward, into1, normalized, placed, put_placed, unit_hit
+from rtcore.wave import DX, ERR, OX, START, T, record
+
+LEAST, MOST = 1e-30, 1e30       # radii of a unit blob's elements; smaller ones can't be seen, larger ones can't be told from these
+LONGEST = 0.05                  # step toward the surface, in a unit blob
+THRESHOLD, COUNT = OWN, OWN + 3     # columns: threshold in two parts (see `halves`), first element, number of elements
+
+
+class Elements(Field):
+    """A list of (center, radius, strength)."""
+
+    def take(self, value):
+        if isinstance(value, (str, bytes, dict)) or not hasattr(value, "__iter__"):
+            raise FieldError("a list of elements: [center, radius, strength] each", value)
+        result = []
+        for i, element in enumerate(value):
+            try:
+                center, radius, strength = element
+            except (TypeError, ValueError):
+                raise FieldError("an element: [center, radius, strength]", element, f"[{i}]") from None
+            parts = []
+            for name, field, part in (("center", Vector(), center), ("radius", Number(above=0), radius), ("strength", Number(), strength)):
+                try:
+                    parts.append(field.take(part))
+                except FieldError as error:
+                    raise error.inside(name).inside(f"[{i}]") from None
+            result.append(tuple(parts))
+        if not 1 <= len(result) <= MOST_ELEMENTS:
+            raise FieldError(f"1 to {MOST_ELEMENTS} elements", len(result))
+        return tuple(result)
+
+
+class Blob(Shape, frozen=True):
+    """Where the field f(p) = Σ strength·(1 - |p - center|²/radius²)², each term within its radius only, equals `threshold`; the inside is
+    where it is greater. A negative strength takes away."""
+
+    elements: Annotated[tuple[tuple[Vec, float, float], ...], Elements(help="center, radius of influence and strength of each element")]
+    threshold: Annotated[float, Number(above=0, help="value of the field on the surface")]
+
+    def check(self):
+        most = sum(strength for _, _, strength in self.elements if strength > 0)
+        if most < self.threshold:
+            raise FieldError(f"positive strengths that together reach the threshold, {self.threshold:g}", most, "elements")
+
+    def kind(self, matrix: np.ndarray) -> Kind:
+        return BLOB
+
+    def pack(self, matrix: np.ndarray) -> Packed:
+        centers, radii = np.array([c for c, _, _ in self.elements]), np.array([r for _, r, _ in self.elements])
+        strengths = np.array([s for _, _, s in self.elements])
+        with np.errstate(all="ignore"):     # numbers that overflow make a matrix that is refused
+            low = (centers - radii[:, None])[strengths > 0].min(0)
+            high = (centers + radii[:, None])[strengths > 0].max(0)
+            scale = np.ldexp(1.0, np.frexp((high / 2 - low / 2).max() * (1 + 2.0 ** -18))[1])
+            # scale a power of two and the middle of few digits: the elements keep theirs
+            middle = np.round((low / 2 + high / 2) / scale * 2.0 ** 20) * 2.0 ** -20 * scale
+            local = matrix @ np.array([[scale, 0, 0, middle[0]], [0, scale, 0, middle[1]], [0, 0, scale, middle[2]], [0, 0, 0, 1]])
+            inverse = invertible(local)
+            unit = np.column_stack([centers / scale - middle / scale, radii / scale])
+            unit *= np.minimum(1, MOST / unit[:, 3:])
+            strong = np.ldexp(1.0, -np.frexp(np.abs(strengths).max())[1])
+            rows = np.column_stack([unit, strengths * strong])[(unit[:, 3] >= LEAST) & (strengths != 0)]
+            extra = np.column_stack(halves(rows))
+        return Packed(BLOB, placed(local, inverse, *halves(self.threshold * strong), 0.0, len(rows))[None], extra)
+
+
+def halves(x):
+    """Float64 as a float32 and the rest, so that a table of float32 keeps 48 digits of it."""
+    first = np.asarray(x, np.float32).astype(np.float64)
+    return first, x - first
+
+
+@inline
+def take_elements(element, data, q, extra):
+    """The elements of blob q in full precision; returns how many there are."""
+    first, count = int(data[q, COUNT - 1]), int(data[q, COUNT])
+    for k in range(count):
+        for j in range(PARTS):
+            element[k, j] = np.float64(extra[first + k, j]) + np.float64(extra[first + k, PARTS + j])
+    return count
+
+
+@inline
+def hit_blob(rays, i, lane, data, q, scratch, count, threshold, side):
+    """One ray against the elements in `scratch`."""
+    ray = rays.ray
+    start, far = ray[START, i], ray[T, i]
+    scratch.found[0, lane] = np.inf
+    if not far > start:
+        return
+    x, y, z = into1(data, q, np.float64(ray[OX, i]) - data[q, 0], np.float64(ray[OX + 1, i]) - data[q, 1],
+                    np.float64(ray[OX + 2, i]) - data[q, 2])
+    ex, ey, ez = into1(data, q, np.float64(ray[DX, i]), np.float64(ray[DX + 1, i]), np.float64(ray[DX + 2, i]))
+    longest = max(abs(ex), max(abs(ey), abs(ez)))
+    ex, ey, ez = ex / longest, ey / longest, ez / longest
+    length = np.sqrt(ex * ex + ey * ey + ez * ez)
+    ex, ey, ez, speed = ex / length, ey / length, ez / length, length * longest
+    shift = 0.0
+    for _ in range(2):      # the closest approach once more: what the first step's rounding left
+        step = -(x * ex + y * ey + z * ez)
+        x, y, z, shift = x + step * ex, y + step * ey, z + step * ez, shift + step
+    low = start * speed - shift
+    m = meet(scratch, count, x, y, z, ex, ey, ez, low)
+    if m > 0:
+        search(scratch, m, threshold, low, shift, speed, start, far, side, lane)
+
+
+@kernel
+def intersect(rays, n, tree, table, first, opacity):
+    walk, scratch = new_walk(rays), new_scratch(rays)
+    data = table.data
+    for start in range(0, n, PACKET):
+        begin(walk, rays, start, n, tree)
+        node = next_leaf(walk, tree)
+        while node >= 0:
+            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                count = take_elements(scratch.element, data, q, table.extra)
+                threshold = np.float64(data[q, THRESHOLD]) + np.float64(data[q, THRESHOLD + 1])
+                for g in range(PACKET // 8):
+                    if (walk.state[1] >> g) & 1:
+                        i = start + g * 8
+                        for lane in range(8):
+                            hit_blob(rays, i + lane, lane, data, q, scratch, count, threshold, table.side[q])
+                        t = load(scratch.found, 0, 0)
+                        record(rays, i, first + q, t, t < np.inf, opacity)
+            shrink(walk, rays, start)
+            node = next_leaf(walk, tree)
+
+
+@inline
+def gradient(element, count, threshold, x, y, z):
+    """Field minus threshold, its gradient (three parts) and its rounding at a point."""
+    f, gx, gy, gz, noise = -threshold, 0.0, 0.0, 0.0, threshold
+    for k in range(count):
+        ux, uy, uz, square = x - element[k, X], y - element[k, Y], z - element[k, Z], element[k, RADIUS] * element[k, RADIUS]
+        w = (square - (ux * ux + uy * uy + uz * uz)) / square
+        if w > 0:
+            g = element[k, STRENGTH] * w
+            f += g * w
+            g *= -4 / square
+            gx, gy, gz, noise = gx + g * ux, gy + g * uy, gz + g * uz, noise + abs(element[k, STRENGTH]) * w
+    return f, gx, gy, gz, noise * NOISE
+
+
+@kernel
+def surface(rays, n, out, table, first):
+    last, taken, count, threshold = first + table.data.shape[0], -1, 0, 0.0
+    data, element = table.data, np.empty((MOST_ELEMENTS, 5))
+    for i in range(n):
+        if first <= rays.prim[i] < last:
+            q = rays.prim[i] - first
+            if q != taken:
+                taken, count = q, take_elements(element, data, q, table.extra)
+                threshold = np.float64(data[q, THRESHOLD]) + np.float64(data[q, THRESHOLD + 1])
+            x, y, z = unit_hit(rays, i, data, q)
+            f, gx, gy, gz, noise = gradient(element, count, threshold, x, y, z)
+            for _ in range(8):
+                square = gx * gx + gy * gy + gz * gz
+                if abs(f) <= 0.25 * noise or abs(f) <= 8 * noise and not abs(f) <= 0.1 * square or not square > 0:
+                    break       # on it, or at a touch, which a step would leave
+                step = f / square
+                step *= min(1.0, LONGEST / (abs(step) * np.sqrt(square)))
+                x, y, z = x - step * gx, y - step * gy, z - step * gz
+                f, gx, gy, gz, noise = gradient(element, count, threshold, x, y, z)
+            steep = np.sqrt(gx * gx + gy * gy + gz * gz)
+            nx, ny, nz = (-gx, -gy, -gz) if steep > noise else (x, y, z)      # where nothing slopes: away from the middle
+            ux, uy, uz = normalized(x, y, z)
+            u, v = np.arctan2(uy, ux) / (2 * np.pi) % 1.0, np.arccos(min(max(-uz, -1.0), 1.0)) / np.pi
+            put_placed(out, i, data, q, x, y, z, nx, ny, nz, u, v)
+            # the rounding of the field moves a flat surface further than that of the point
+            size = max(abs(data[q, 12]) + abs(data[q, 13]) + abs(data[q, 14]), max(
+                abs(data[q, 15]) + abs(data[q, 16]) + abs(data[q, 17]), abs(data[q, 18]) + abs(data[q, 19]) + abs(data[q, 20])))
+            out[ERR, i] = max(out[ERR, i], size * min(noise / max(steep, noise), 1e-6))
+
+
+def _bounds(data, extra):
+    owner = np.repeat(np.arange(len(data)), data[:, COUNT].astype(int))
+    element, m = extra[:, :PARTS] + extra[:, PARTS:], forward(data)
+    middle = data[owner, :3] + np.einsum("nij,nj->ni", m[owner], element[:, :3])
+    half = element[:, RADIUS, None] * np.sqrt((m[owner] ** 2).sum(2)) + 1e-12 * data[owner, REACH, None]
+    low, high, adds = np.full((len(data), 3), np.inf), np.full((len(data), 3), -np.inf), element[:, STRENGTH] > 0
+    np.minimum.at(low, owner[adds], (middle - half)[adds])
+    np.maximum.at(high, owner[adds], (middle + half)[adds])
+    return low, high
+
+
+BLOB = Kind("blob", intersect, surface, _bounds, (Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25), ()), shared_extra=True)
