@@ -9,8 +9,8 @@ from rtcore.jit import inline, kernel
 from rtcore.lanes import load
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._blob import MOST_ELEMENTS, NOISE, PARTS, RADIUS, STRENGTH, X, Y, Z, meet, new_scratch, search
-from rtcore.shapes.kind import OWN, REACH, Kind, Packed, forward, into1, normalized, placed, put_placed, unit_hit
-from rtcore.wave import DX, ERR, OX, START, T, record
+from rtcore.shapes.kind import OWN, REACH, Kind, Packed, around, forward, into1, normalized, placed, put_placed, unit_hit
+from rtcore.wave import DX, ERR, OX, START, T, U, record
 
 LEAST, MOST = 1e-30, 1e30       # radii of a unit blob's elements; smaller ones can't be seen, larger ones can't be told from these
 LONGEST = 0.05                  # step toward the surface, in a unit blob
@@ -176,7 +176,7 @@ def surface(rays, n, out, table, first):
             steep = np.sqrt(gx * gx + gy * gy + gz * gz)
             nx, ny, nz = (-gx, -gy, -gz) if steep > noise else (x, y, z)      # where nothing slopes: away from the middle
             ux, uy, uz = normalized(x, y, z)
-            u, v = np.arctan2(uy, ux) / (2 * np.pi) % 1.0, np.arccos(min(max(-uz, -1.0), 1.0)) / np.pi
+            u, v = around(out, uy, ux), np.arccos(min(max(-uz, -1.0), 1.0)) / np.pi if out.shape[0] > U else 0.0
             put_placed(out, i, data, q, x, y, z, nx, ny, nz, u, v)
             # the rounding of the field moves a flat surface further than that of the point
             size = max(abs(data[q, 12]) + abs(data[q, 13]) + abs(data[q, 14]), max(
@@ -195,4 +195,4 @@ def _bounds(data, extra):
     return low, high
 
 
-BLOB = Kind("blob", intersect, surface, _bounds, (Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25), ()), shared_extra=True)
+BLOB = Kind("blob", intersect, surface, _bounds, (Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25), ()), leaf_most=1, shared_extra=True)
