@@ -195,4 +195,5 @@ def _bounds(data, extra):
     return low, high
 
 
-BLOB = Kind("blob", intersect, surface, _bounds, (Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25), ()), leaf_most=1, shared_extra=True)
+_PAIR = Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25)
+BLOB = Kind("blob", intersect, surface, _bounds, (_PAIR, ()), leaf_most=1, shared_extra=True)
