@@ -92,6 +92,7 @@ class Render:
     def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, threads: int, coarse: bool):
         scene, camera, self.settings = request
         self.plan = composed
+        self.dropped = geometry.dropped
         width, height = self.settings.size
         view = camera.rays(width, height)
         self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
@@ -248,11 +249,12 @@ class Renderer:
         """The last request in the form of the command line's --stats, without what only the caller knows."""
         render = self._render
         settings = render.settings
+        left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
         return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),
                 "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed},
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
-                "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in render.plan.left_out],
+                "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
                 "error": {"rmse_estimate": films.rmse_estimate(render.film)}}
 
 

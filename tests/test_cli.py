@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from commandline import BALL, ENVIRONMENT, ROOT, ball_in, one_line, picture, process, run_here
 
+import rtcore
 from app import __main__ as cli
 from app.commands import COMMANDS, _progress, _shared
 from app.commands import render as render_command
@@ -192,3 +193,12 @@ def test_progress_on_a_terminal_and_elsewhere(capsys, monkeypatch):
     with _progress.Progress("rendering") as bar:
         bar.show(0.5, "4 of 8 samples", left=7500)
         assert bar._bar.tasks[0].fields["left"] == "2 h 05 min left" and bar._bar.tasks[0].completed == 0.5
+
+
+def test_triangles_without_area_are_counted(run, tmp_path):
+    path = tmp_path / "flat.yaml"
+    path.write_text("rayscope: 1\nscene: [{mesh: {vertices: [[0,0,0],[1,0,0],[0,1,0],[2,0,0]], faces: [[0,1,2],[0,1,3]]}}]\n")
+    code, out, err = run("check", path)
+    assert (code, err) == (0, "") and "1 degenerate triangle left out" in out
+    stats = rtcore.render(rtcore.load(path), (8, 8)).stats
+    assert {"stage": "degenerate triangles", "why": "1 without area"} in stats["left_out"]

@@ -15,19 +15,19 @@ def run(args, parser: Parser) -> int:
     scene, _ = loaded(args.scene)
     with refusing(args.scene):
         leaves = list(scene.leaves())
-        for leaf in leaves:
-            _place(leaf)
+        dropped = sum(_place(leaf) for leaf in leaves)
     lights = "studio lights" if scene.lights is None else _counted(len(scene.lights), "light")
-    print(f"{args.scene}: sound: {_counted(len(leaves), 'shape')}, {lights}")
+    note = f"; {_counted(dropped, 'degenerate triangle')} left out" if dropped else ""
+    print(f"{args.scene}: sound: {_counted(len(leaves), 'shape')}, {lights}{note}")
     return 0
 
 
-def _place(leaf) -> None:
-    """FieldError if the shape can't stand where it is put: the transforms around it are singular only all together."""
+def _place(leaf) -> int:
+    """How many of its triangles have no area. FieldError if the shape can't stand where it is put: the transforms around it are singular only all together."""
     from rtcore.fields import FieldError
     from rtcore.flatten import place
     try:
-        leaf.shape.pack(leaf.matrix)
+        return leaf.shape.pack(leaf.matrix).dropped
     except FieldError as error:
         raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
 
