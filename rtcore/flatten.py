@@ -55,7 +55,7 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         key = tuple((index, leaves[index].shape, leaves[index].matrix.tobytes()) for index in kinds[kind])
         group = old.get(kind)
         if group is None or not _same(group.key, key):
-            group = _gather(kind, key, [(index, _packed(leaves[index])) for index in kinds[kind]], leaves, dtype)
+            group = _gather(kind, key, [(index, packed(leaves[index])) for index in kinds[kind]], leaves, dtype)
         groups.append(group._replace(first=first))
         owners.append(group.owner)
         first += len(group.owner)
@@ -69,7 +69,8 @@ def _same(a: tuple, b: tuple) -> bool:
     return len(a) == len(b) and all(x[0] == y[0] and x[1] is y[1] and x[2] == y[2] for x, y in zip(a, b))
 
 
-def _packed(leaf: Leaf) -> Packed:
+def packed(leaf: Leaf) -> Packed:
+    """A leaf's primitives. FieldError if it can't stand where it is put: the transforms around it may be singular only all together."""
     try:
         return leaf.shape.pack(leaf.matrix)
     except FieldError as error:

@@ -12,24 +12,15 @@ def arguments(parser: Parser) -> None:
 
 def run(args, parser: Parser) -> int:
     """Load the scene and place every shape in it as a render would."""
+    from rtcore.flatten import packed
     scene, _ = loaded(args.scene)
     with refusing(args.scene):
         leaves = list(scene.leaves())
-        dropped = sum(_place(leaf) for leaf in leaves)
+        dropped = sum(packed(leaf).dropped for leaf in leaves)
     lights = "studio lights" if scene.lights is None else _counted(len(scene.lights), "light")
     note = f"; {_counted(dropped, 'degenerate triangle')} left out" if dropped else ""
     print(f"{args.scene}: sound: {_counted(len(leaves), 'shape')}, {lights}{note}")
     return 0
-
-
-def _place(leaf) -> int:
-    """How many of its triangles have no area. FieldError if the shape can't stand where it is put: the transforms around it are singular only all together."""
-    from rtcore.fields import FieldError
-    from rtcore.flatten import place
-    try:
-        return leaf.shape.pack(leaf.matrix).dropped
-    except FieldError as error:
-        raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
 
 
 def _counted(count: int, what: str) -> str:
