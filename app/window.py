@@ -282,16 +282,22 @@ class Window(QMainWindow):
 
     def save_as(self, then: Callable[[], None] = lambda: None):
         """Ask for a name and save there."""
-        here = self.session.document.path
-        start = self.filing.in_place or Path.cwd() / (here.with_suffix(".yaml").name if here else "scene.yaml")
+        start = self.filing.in_place or self._suggested("scene.yaml")
         name, _ = QFileDialog.getSaveFileName(self, "Save the scene", str(start), "Scenes (*.yaml)")
         if name:
             self.filing.save(Path(name) if Path(name).suffix else Path(name).with_suffix(".yaml"), then)
 
+    def _suggested(self, name: str) -> Path:
+        """A name for a new file: the open one's beside it, or in the current folder where that is a gallery scene; else `name`."""
+        here = self.session.document.path
+        if here is None:
+            return Path.cwd() / name
+        folder = Path.cwd() if here.parent == GALLERY else here.parent
+        return folder / here.with_suffix(Path(name).suffix).name
+
     def save_picture(self):
         """Ask for a name and save what is on the screen."""
-        here = self.session.document.path
-        start = Path.cwd() / (here.with_suffix(".png").name if here else "rayscope.png")
+        start = self._suggested("rayscope.png")
         name, _ = QFileDialog.getSaveFileName(self, "Save the picture", str(start), "Pictures (*.png *.exr)")
         if name:
             self.filing.save_picture(Path(name) if Path(name).suffix else Path(name).with_suffix(".png"))

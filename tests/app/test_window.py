@@ -5,11 +5,12 @@ import msgspec
 import pytest
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import (QApplication, QCheckBox, QComboBox, QDockWidget, QLineEdit, QMessageBox, QPushButton, QSlider, QTabBar,
-                               QToolButton)
+from PySide6.QtWidgets import (QApplication, QCheckBox, QComboBox, QDockWidget, QFileDialog, QLineEdit, QMessageBox, QPushButton,
+                               QSlider, QTabBar, QToolButton)
 
 import rtcore
 from app import dialogs
+from app.gallery import GALLERY
 from app.places import Place
 
 
@@ -132,3 +133,18 @@ def test_everything_has_a_tooltip_and_an_accessible_name(window, session):
                 if widget.window() is window and not qts_own:
                     assert widget.accessibleName() or getattr(widget, "text", str)(), widget
                     assert widget.toolTip(), (widget, widget.accessibleName())
+
+
+@pytest.mark.parametrize(("opened", "as_scene", "as_picture"), [
+    ("elsewhere/balls.nff", "elsewhere/balls.yaml", "elsewhere/balls.png"),     # beside what it came from
+    (GALLERY / "tori.yaml", "here/tori.yaml", "here/tori.png"),                 # nothing is written into the gallery
+    (None, "here/scene.yaml", "here/rayscope.png")])
+def test_dialogs_suggest_a_new_file_where_it_belongs(window, session, tmp_path, monkeypatch, opened, as_scene, as_picture):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    session.document.path = opened and tmp_path / opened
+    suggested = []
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda parent, title, start, kinds: (suggested.append(start), ("", ""))[1])
+    window.save_as()
+    window.save_picture()
+    assert suggested == [str(tmp_path / as_scene), str(tmp_path / as_picture)]
