@@ -17,7 +17,8 @@ from rtcore.wave import (AIM_REACH, AIM_STRENGTH, DEPTH_UNIT, DX, DY, DZ, ERR, G
  SIZE, PATTERN) = 0, 3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 17, 18, 21, 24, 25
 MATERIAL_COLUMNS = 37
 
-#: A ray that can't change a pixel by more than this is not followed: a 16th of the smallest step of an 8-bit picture's darkest shades.
+#: A ray that adds to its pixel less than this share of the light it meets is not followed: for white, a twentieth of the first step above
+#: black in an 8-bit picture.
 NEGLIGIBLE = 2.0 ** -16
 
 

@@ -56,7 +56,7 @@ class Polyhedron(Shape, frozen=True):
         center = low / 2 + high / 2 if bounded(normals) else points[0]
         heights = ((points - center) * normals).sum(1)
         row = np.array([[*center, *low, *high, 0.0, len(points)]])
-        return Packed(self.kind(matrix), row, np.column_stack([normals, heights, np.zeros((len(points), 5))]))
+        return Packed(self.kind(matrix), row, np.column_stack([normals, heights]))
 
 
 def half_spaces(planes, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
