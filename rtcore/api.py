@@ -75,7 +75,7 @@ def intersect(scene: Scene, origins, directions, t_min=0.0, t_max=math.inf, prec
     surface = np.zeros((SURFACE_ROWS, rays.ray.shape[1]), geometry.dtype)
 
     def trace(a: int, b: int) -> None:
-        part = Rays(np.ascontiguousarray(rays.ray[:, a:b]), rays.prim[a:b], rays.depth[a:b])
+        part = rays._replace(ray=np.ascontiguousarray(rays.ray[:, a:b]), prim=rays.prim[a:b], depth=rays.depth[a:b], doubt=rays.doubt[a:b])
         for group in geometry.groups:
             group.kind.intersect(part, b - a, group.tree, group.table, group.first, CLOSEST)
         found = np.zeros((SURFACE_ROWS, b - a), geometry.dtype)
@@ -97,7 +97,7 @@ def occluded(scene: Scene, origins, directions, t_max=math.inf, precision: str =
     opaque = np.full(max(len(geometry.leaf), 1), OPAQUE, np.int32)
 
     def trace(a: int, b: int) -> None:
-        part = Rays(np.ascontiguousarray(rays.ray[:, a:b]), rays.prim[a:b], rays.depth[a:b])
+        part = rays._replace(ray=np.ascontiguousarray(rays.ray[:, a:b]), prim=rays.prim[a:b], depth=rays.depth[a:b], doubt=rays.doubt[a:b])
         for group in geometry.groups:
             group.kind.intersect(part, b - a, group.tree, group.table, group.first, opaque)
 

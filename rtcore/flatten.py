@@ -55,7 +55,7 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         key = tuple((index, leaves[index].shape, leaves[index].matrix.tobytes()) for index in kinds[kind])
         group = old.get(kind)
         if group is None or not _same(group.key, key):
-            group = _gather(kind, key, [(index, packed(leaves[index])) for index in kinds[kind]], leaves, dtype)
+            group = _gather(kind, key, [(index, packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
         groups.append(group._replace(first=first))
         owners.append(group.owner)
         first += len(group.owner)
@@ -69,10 +69,17 @@ def _same(a: tuple, b: tuple) -> bool:
     return len(a) == len(b) and all(x[0] == y[0] and x[1] is y[1] and x[2] == y[2] for x, y in zip(a, b))
 
 
-def packed(leaf: Leaf) -> Packed:
-    """A leaf's primitives. FieldError if it can't stand where it is put: the transforms around it may be singular only all together."""
+def packed(leaf: Leaf, dtype=np.float64) -> Packed:
+    """A leaf's primitives, made from the shape's own numbers rounded to the precision; its matrix stays as it is. FieldError if the shape
+    can't stand where it is put: the transforms around it may be singular only all together."""
+    shape = leaf.shape
+    if dtype != np.float64:
+        try:
+            shape = shape.rounded(dtype)
+        except FieldError as error:
+            raise FieldError(f"a shape whose numbers fit {np.dtype(dtype).name}", error.got, place(leaf)) from error
     try:
-        return leaf.shape.pack(leaf.matrix)
+        return shape.pack(leaf.matrix)
     except FieldError as error:
         raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
 
@@ -88,6 +95,7 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
     lengths = [len(p.data) for _, p in packs]
     owner = np.repeat(np.array([index for index, _ in packs], np.int32), lengths)
     side = np.repeat(np.array([SIDES[leaves[index].shape.sides] + (MIRRORED if p.mirrored else 0) for index, p in packs], np.int8), lengths)
+    exact = np.concatenate([np.zeros((len(p.data), 0)) if p.exact is None else p.exact for _, p in packs])
     extra = np.zeros((0, 3 if kind.shared_extra else 9))
     if kind.shared_extra:
         extra = np.concatenate([p.extra for _, p in packs])
@@ -97,7 +105,7 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         extra = np.concatenate([p.extra if p.extra is not None else np.zeros((len(p.data), 9)) for _, p in packs])
     outline = np.repeat([index for index, _ in packs], [len(p.extra) for _, p in packs]) if kind.shared_extra else owner
     with np.errstate(over="ignore"):
-        wild = [of[~np.isfinite(a.astype(dtype)).all(axis=1)] for a, of in ((data, owner), (extra, outline)) if len(a)]
+        wild = [of[~np.isfinite(a.astype(dtype)).all(axis=1)] for a, of in ((data, owner), (extra, outline), (exact, owner)) if len(a)]
     if any(map(len, wild)):
         leaf = leaves[np.concatenate(wild)[0]]
         raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
@@ -108,8 +116,8 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         low, high = kind.bounds(*rounded)
         tree, order = build(low, high, kind.leaf_most)
         has_tree = len(tree.box) > 1
-        data, owner, side = data[order], owner[order], side[order]
+        data, owner, side, exact = data[order], owner[order], side[order], exact[order]
         if len(extra) and not kind.shared_extra:
             extra = extra[order]
-    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, dtype), side)
+    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, dtype), side, np.ascontiguousarray(exact))
     return Group(kind, tree, table, 0, has_tree, key, owner, sum(p.dropped for _, p in packs))

@@ -238,6 +238,23 @@ def narrow(tc, x):
     return F32(x), lambda ctx, b, sig, a: a[0] if x == F32 else b.fptrunc(a[0], ir.VectorType(ir.FloatType(), LANES))
 
 
+@intrinsic
+def wide(tc, x):
+    """Lanes, or the Lanes of a Vec3, as float64."""
+    def gen(ctx, b, sig, a):
+        to = ir.VectorType(ir.DoubleType(), LANES)
+        if isinstance(x, Vec3):
+            return _vec3(ctx, b, Vec3(F64), [p if x.part == F64 else b.fpext(p, to) for p in _parts(ctx, b, x, a[0])])
+        return a[0] if x == F64 else b.fpext(a[0], to)
+    return (Vec3(F64) if isinstance(x, Vec3) else F64)(x), gen
+
+
+@intrinsic
+def rounded(tc, x, like):
+    """Float64 lanes rounded to the type of the lanes `like`."""
+    return like(x, like), lambda ctx, b, sig, a: a[0] if like == F64 else b.fptrunc(a[0], ir.VectorType(ir.FloatType(), LANES))
+
+
 # --- three-vectors ---
 
 @intrinsic

@@ -26,6 +26,19 @@ class Shape(Record, frozen=True, kw_only=True):
         """How many primitives the shape becomes."""
         return 1
 
+    def rounded(self, dtype) -> "Shape":
+        """The shape with its numbers rounded to a type of numpy. FieldError where one becomes infinite, or 0 where it must not."""
+        with np.errstate(over="ignore"):
+            return msgspec.structs.replace(self, **{name: _rounded(getattr(self, name), dtype) for name in self.__struct_fields__})
+
+
+def _rounded(value, dtype):
+    if isinstance(value, tuple):
+        return tuple(_rounded(part, dtype) for part in value)
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        return value.astype(dtype).astype(np.float64)
+    return float(dtype(value)) if isinstance(value, float) else value
+
 
 class Light(Record, frozen=True, kw_only=True):
     """What every light has besides its own fields. Its module in `rtcore.lights` holds the rest."""

@@ -26,12 +26,18 @@ OPAQUE = 1 << 24
 DEPTH_UNIT = 2.0 ** -16
 
 
+#: Places in Rays.tally: rays that were sent to a slow exact solver, hits recorded without a proof.
+SLOW, UNCERTIFIED = 0, 1
+
+
 class Rays(NamedTuple):
     """What the intersection kernels read and write."""
 
     ray: np.ndarray     # P (8, n)
     prim: np.ndarray    # int32 (n): the primitive hit, -1 none
     depth: np.ndarray   # int32 (n): optical depth met so far; shadow waves only
+    doubt: np.ndarray   # uint8 (n): 1 where the hit is not certified; means something only for primitives of kinds that can doubt
+    tally: np.ndarray   # int64 (2): what the kernels count, SLOW and UNCERTIFIED
 
 
 def padded(n: int) -> int:
@@ -42,7 +48,7 @@ def padded(n: int) -> int:
 def new_rays(n: int, dtype) -> Rays:
     """Rays for `n` rays, with nothing set."""
     n = padded(n)
-    return Rays(np.empty((RAY_ROWS, n), dtype), np.empty(n, np.int32), np.empty(n, np.int32))
+    return Rays(np.empty((RAY_ROWS, n), dtype), np.empty(n, np.int32), np.empty(n, np.int32), np.zeros(n, np.uint8), np.zeros(2, np.int64))
 
 
 @inline

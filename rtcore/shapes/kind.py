@@ -30,6 +30,7 @@ class Table(NamedTuple):
     data: np.ndarray    # P (n, w)
     extra: np.ndarray   # P (m, k)
     side: np.ndarray    # int8 (n)
+    exact: np.ndarray   # float64 (n, k), whatever P is: numbers, mostly as pairs, from which a kernel can work out a certain answer
 
 
 class Packed(NamedTuple):
@@ -40,6 +41,7 @@ class Packed(NamedTuple):
     extra: np.ndarray | None = None     # (n, k), or what `Kind.shared_extra` says
     mirrored: bool = False              # the transform turned the winding around
     dropped: int = 0                    # degenerate primitives left out
+    exact: np.ndarray | None = None     # (n, k), for kinds that have it
 
 
 @dataclass(frozen=True, eq=False)
