@@ -4,8 +4,7 @@ import pytest
 
 import rtcore
 from rtcore import Blob, FieldError, Node, Scale, Scene
-
-from naive import TWINS, crossings, mp, nearest, vector
+from rtcore.reports.oracle import TWINS, crossings, mp, nearest, vector
 
 ONE = Blob([((0, 0, 0), 1, 1)], 0.6)
 TWO = Blob([((0.75, 0, 0), 1, 1), ((-0.75, 0, 0), 1, 1)], 0.3828125)

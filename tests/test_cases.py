@@ -11,8 +11,7 @@ import pytest
 import rtcore
 from rtcore import (Box, Cone, Cylinder, FieldError, Matrix, Mesh, Node, Plane, Polygon, Rotate, Scale, Scene, Shear, Sphere, Translate,
                     Triangle)
-
-from naive import mp, nearest
+from rtcore.reports.oracle import mp, nearest
 
 BALL = Sphere((0, 0, 0), 1)
 UP, DOWN, X = (0, 0, 1), (0, 0, -1), (1, 0, 0)

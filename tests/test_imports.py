@@ -24,7 +24,9 @@ LAYERS = (
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
     {"rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},
-    {"rtcore.api", "rtcore.reports"},
+    {"rtcore.api"},
+    {"rtcore.solvers"},       # compared by the reports; the renderer knows its own kernels only
+    {"rtcore.reports"},
     {"rtcore"},
 )
 FAMILIES = ("rtcore.shapes", "rtcore.lights", "rtcore.files", "rtcore.views")

@@ -13,8 +13,7 @@ import pytest
 import rtcore
 from rtcore import Blob, Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus, Triangle
 from rtcore.shapes import SHAPES
-
-from naive import crossings, mp, nearest, vector
+from rtcore.reports.oracle import crossings, mp, nearest, vector
 
 BOUND = 8
 UNIT = {"f64": 2.0 ** -53, "f32": 2.0 ** -24}

@@ -1,0 +1,1 @@
+"""Intersection methods by name, for comparison."""
