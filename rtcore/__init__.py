@@ -3,9 +3,11 @@
     scene = rtcore.load("scene.yaml")
     image = rtcore.render(scene, size=(640, 480), spp=4)
     hits = rtcore.intersect(scene, origins, directions)
+    t = rtcore.crossings(scene, origin, direction)
 
 Shapes, lights and the parts of a scene are records to be made directly: `rtcore.Sphere((0, 0, 0), 1)`.
 """
+from rtcore.algebra.crossings import crossings
 from rtcore.api import Hits, Image, intersect, occluded, render
 from rtcore.camera import Camera
 from rtcore.fields import FieldError
@@ -16,5 +18,5 @@ from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyh
 
 __all__ = ["Ambient", "Background", "Blob", "Box", "Camera", "Checker", "Cone", "Cylinder", "Directional", "FieldError", "FileError", "Fog",
            "Hits", "Image", "Material", "Matrix", "Mesh", "Node", "Plane", "Point", "Polygon", "Polyhedron", "Quadric", "Rotate", "Scale",
-           "Scene", "Shear", "Sphere", "Torus", "Translate", "Triangle", "intersect", "load", "occluded", "render", "save"]
+           "Scene", "Shear", "Sphere", "Torus", "Translate", "Triangle", "crossings", "intersect", "load", "occluded", "render", "save"]
 __version__ = "0.1.0"

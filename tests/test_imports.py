@@ -17,12 +17,12 @@ LAYERS = (
     {"rtcore.fields"},
     {"rtcore.camera"},
     {"rtcore.scene"},
-    {"rtcore.exact", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.wave"},
+    {"rtcore.exact", "rtcore.expansions", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.wave"},
     {"rtcore.bvh", "rtcore.sampling", "rtcore.roots"},     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film"},
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
-    {"rtcore.trace"},
+    {"rtcore.algebra", "rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},
     {"rtcore.api"},
     {"rtcore.solvers"},       # compared by the reports; the renderer knows its own kernels only
