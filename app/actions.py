@@ -17,6 +17,7 @@ class Action(NamedTuple):
 
 ACTIONS = (
     Action("open", "&Open…", "open", "Ctrl+O", "Open a scene, an NFF file or a mesh", lambda w: w.ask_open()),
+    Action("gallery", "&Gallery…", "gallery", "Ctrl+G", "The scenes that come along, with pictures and notes", lambda w: w.gallery.open()),
     Action("reload", "&Reload", "reload", "F5", "Read the file again and keep the view", lambda w: w.reload()),
     Action("save", "&Save", "save", "Ctrl+S", "Save the scene with the camera as it is now", lambda w: w.save()),
     Action("save_as", "Save &as…", "", "Ctrl+Shift+S", "Save the scene under another name", lambda w: w.save_as()),
@@ -49,18 +50,18 @@ ACTIONS = (
 
 #: Menus by title; None is a line, a name in <> a submenu that the window fills.
 MENUS = (
-    ("&File", ("open", "<recent>", "<gallery>", "reload", None, "save", "save_as", "save_picture", None, "quit")),
+    ("&File", ("open", "<recent>", "gallery", "reload", None, "save", "save_as", "save_picture", None, "quit")),
     ("&Edit", ("undo", "redo")),
     ("&View", ("back", "forward", None, "frame_selection", "frame_all", "reset_view", None, "shadows", "fog", "reflections", None,
                "<panels>", "<theme>", "panels", "fullscreen", "arrange")),
     ("&Help", ("shortcuts", "about")),
 )
 
-TOOLBAR = ("open", "<gallery>", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection",
+TOOLBAR = ("open", "gallery", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection",
            "frame_all", "reset_view", None, "shadows", "fog", "reflections", "<space>", "panels", "fullscreen", "shortcuts")
 
 #: Shown with their names in the toolbar, because a symbol alone would not tell.
-WORDED = ("shadows", "fog", "reflections")
+WORDED = ("gallery", "shadows", "fog", "reflections")
 
 #: What the mouse and the fly keys do in the picture, for the shortcuts' dialog.
 MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"),

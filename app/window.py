@@ -5,12 +5,13 @@ from pathlib import Path
 from PySide6.QtCore import QSize, Qt, QTimer, Slot
 from PySide6.QtGui import QAction, QActionGroup, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (QApplication, QDockWidget, QFileDialog, QMainWindow, QMenu, QMessageBox, QSizePolicy, QTabWidget,
-                               QToolButton, QWidget)
+                               QWidget)
 
 from app import dialogs, theme
 from app.actions import ACTIONS, MENUS, TOOLBAR, WORDED, Action
 from app.filing import Filing
-from app.gallery import GALLERY, gallery
+from app.gallery import GALLERY
+from app.gallery_dialog import Gallery
 from app.icons import app_icon, icon
 from app.notices import Busy, Notice
 from app.panels import PANELS
@@ -36,7 +37,6 @@ class Window(QMainWindow):
         self.panels: dict[str, QWidget] = {}
         self.docks: dict[str, QDockWidget] = {}
         self._submenus: dict[str, QMenu] = {}
-        self._buttons: list[tuple[QToolButton, str]] = []
         self._hidden: list[QDockWidget] = []
         self._sure = False
         self.setWindowIcon(app_icon())
@@ -48,6 +48,7 @@ class Window(QMainWindow):
         self.setCentralWidget(self.viewport)
         self.notice = Notice(session, self.viewport)
         self.busy = Busy(session, self.filing, self.viewport)
+        self.gallery = Gallery(session, self)
         self.setStatusBar(Status(session, self))
         self._make_docks()
         self._make_actions()
@@ -57,6 +58,7 @@ class Window(QMainWindow):
         session.camera_changed.connect(self._refresh)
         session.options_changed.connect(self._refresh)
         self.filing.opened.connect(self._remember)
+        self.gallery.chosen.connect(self.open)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._scheme_changed)
         self.dress()
         self._restore()
@@ -125,8 +127,8 @@ class Window(QMainWindow):
         return (lambda on: entry.do(self, on)) if entry.switch else (lambda _=False: entry.do(self))
 
     def _make_menus(self):
-        fillers = {"<recent>": ("Open &recent", self._fill_recent), "<gallery>": ("&Gallery", self._fill_gallery),
-                   "<panels>": ("Pa&nel", self._fill_panels), "<theme>": ("&Theme", self._fill_theme)}
+        fillers = {"<recent>": ("Open &recent", self._fill_recent), "<panels>": ("Pa&nel", self._fill_panels),
+                   "<theme>": ("&Theme", self._fill_theme)}
         for name, (title, fill) in fillers.items():
             menu = QMenu(title, self)
             menu.setToolTipsVisible(True)
@@ -157,14 +159,6 @@ class Window(QMainWindow):
                 space = QWidget()
                 space.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
                 bar.addWidget(space)
-            elif name == "<gallery>":
-                button = QToolButton()
-                button.setToolTip("Scenes that come with Rayscope")
-                button.setAccessibleName("Gallery")
-                button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-                button.setMenu(self._submenus[name])
-                self._buttons.append((button, "gallery"))
-                bar.addWidget(button)
             else:
                 bar.addAction(self.actions_by_id[name])
                 button = bar.widgetForAction(self.actions_by_id[name])
@@ -181,12 +175,6 @@ class Window(QMainWindow):
         if not menu.isEmpty():
             menu.addSeparator()
             menu.addAction("Forget these", self.preferences.forget_recent).setToolTip("Empty this list; the files stay")
-
-    def _fill_gallery(self):
-        menu = self._submenus["<gallery>"]
-        menu.clear()
-        for title, path in gallery():
-            menu.addAction(title, lambda path=path: self.open(path)).setToolTip(f"Open {path.name}")
 
     def _fill_panels(self):
         menu = self._submenus["<panels>"]
@@ -220,9 +208,7 @@ class Window(QMainWindow):
         for entry in ACTIONS:
             if entry.icon:
                 self.actions_by_id[entry.id].setIcon(icon(entry.icon, chosen))
-        for button, name in self._buttons:
-            button.setIcon(icon(name, chosen))
-        for widget in (self.viewport, self.notice, *self.panels.values()):
+        for widget in (self.viewport, self.notice, self.gallery, *self.panels.values()):
             if hasattr(widget, "dress"):
                 widget.dress(chosen)
 
