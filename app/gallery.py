@@ -38,7 +38,7 @@ class Entry(NamedTuple):
     @property
     def line(self) -> str:
         """The first sentence of the note."""
-        return re.split(r"(?<=[.!?:])\s", self.note, maxsplit=1)[0].rstrip(":")
+        return re.split(r"(?<=[.!?])\s", self.note, maxsplit=1)[0]
 
 
 def gallery() -> list[Entry]:
