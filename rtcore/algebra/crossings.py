@@ -39,7 +39,7 @@ def crossings(shape: Shape | Node | Scene, origin, direction, precision: str = "
     if not any(d):
         raise FieldError("a vector that is not zero", d, "direction")
     line, power = line_of(o, d)
-    found = [nearest(c.root, power, *DIGITS[precision]) for find, sides in _finders(shape, dtype)
+    found = [nearest(c.root, power, *DIGITS[precision]) for find, sides in _finders(_Same(shape), dtype)
              for c in _passages(_seen(find(line), sides)) for _ in range(c.times)]
     with np.errstate(over="ignore"):
         return np.array(sorted(found), np.float64).astype(dtype)
@@ -57,30 +57,41 @@ def _vector(value, name: str, dtype: type) -> list[float]:
     return numbers
 
 
-def _finders(shape, dtype: type) -> list[tuple[Find, str]]:
+class _Same:
+    """A frozen record as a key that only itself is equal to: whole scenes are not compared."""
+
+    def __init__(self, record):
+        self.record = record
+
+    def __eq__(self, other):
+        return self.record is other.record
+
+    def __hash__(self):
+        return id(self.record)
+
+
+@functools.lru_cache(maxsize=16)        # a loop over rays prepares its shapes once
+def _finders(same: _Same, dtype: type) -> list[tuple[Find, str]]:
     """What finds the crossings of each visible shape, and which sides it shows."""
-    if isinstance(shape, Shape):
-        return [(_finder(shape, _HERE, dtype), shape.sides)]
-    if not isinstance(shape, (Node, Scene)):
-        raise FieldError("a shape, a node or a scene", shape, "shape")
+    record = same.record
+    if isinstance(record, Shape):
+        return [(_finder(record, np.eye(4), dtype), record.sides)]
+    if not isinstance(record, (Node, Scene)):
+        raise FieldError("a shape, a node or a scene", record, "shape")
     result = []
-    for leaf in (shape if isinstance(shape, Scene) else Scene(objects=(shape,))).leaves():
+    for leaf in (record if isinstance(record, Scene) else Scene(objects=(record,))).leaves():
         if leaf.visible:
             try:
-                result.append((_finder(leaf.shape, leaf.matrix.tobytes(), dtype), leaf.shape.sides))
+                result.append((_finder(leaf.shape, leaf.matrix, dtype), leaf.shape.sides))
             except FieldError as error:
                 raise error.inside(where(leaf)) from None
     return result
 
 
-_HERE = np.eye(4).tobytes()
-
-
-@functools.lru_cache(maxsize=1024)      # a loop over rays prepares each shape once
-def _finder(shape: Shape, matrix: bytes, dtype: type) -> Find:
+def _finder(shape: Shape, matrix: np.ndarray, dtype: type) -> Find:
     if type(shape) not in FINDERS:
-        raise FieldError("one of the shapes " + ", ".join(sorted(known.__name__ for known in FINDERS)), type(shape).__name__, "shape")
-    return FINDERS[type(shape)](shape, Place(np.frombuffer(matrix).reshape(4, 4), dtype))
+        raise FieldError("one of " + ", ".join(sorted(known.__name__ for known in FINDERS)), type(shape).__name__)
+    return FINDERS[type(shape)](shape, Place(matrix, dtype))
 
 
 def _seen(found: list[Crossing], sides: str) -> list[Crossing]:

@@ -120,15 +120,21 @@ def blob(shape, place: Place) -> Find:
     """The ends of the elements' spheres cut the line into stretches, on each of which the field is one quartic."""
     spheres, shift = place.whole(*(x for center, radius, _ in shape.elements for x in (*center, radius)))
     (threshold, *strengths), _ = place.whole(shape.threshold, *(strength for _, _, strength in shape.elements))
+    strong = max(1, *strengths)
+    level = threshold / strong * (1 - 1e-9)
     elements = [(spheres[4 * k:4 * k + 3], spheres[4 * k + 3], strength) for k, strength in enumerate(strengths) if strength]
 
     def find(line: Line) -> list[Crossing]:
         line = place.local(line)
         ends = []
         for center, radius, strength in elements:
-            depth = plus([(radius * line.scale) ** 2], scaled(square(*seen_from(line, center, shift)), -1))
-            roots, element = real_roots(depth), (depth, radius ** 4, strength)
+            reach = (radius * line.scale) ** 2
+            depth = plus([reach], scaled(square(*seen_from(line, center, shift)), -1))
+            roots = real_roots(depth)
             if len(roots) == 2:
+                c, b, a = depth
+                peak = (4 * a * c - b * b) / (4 * a * reach)
+                element = depth, radius ** 4, strength, max(strength, 0) / strong * peak ** 2
                 ends += [(root, element) for root, _ in roots]
         ends.sort(key=functools.cmp_to_key(lambda a, b: compare(a[0], b[0])))
         found, active = [], []
@@ -138,11 +144,11 @@ def blob(shape, place: Place) -> Find:
             active = [a for a in active if a is not element]
             if len(active) == known:
                 active.append(element)
-            if sum(s for _, _, s in active if s > 0) < threshold or compare(low, high) == 0:
+            if sum(most for *_, most in active) < level or compare(low, high) == 0:
                 continue
-            common = math.lcm(*(fourth for _, fourth, _ in active))
+            common = math.lcm(*(fourth for _, fourth, _, _ in active))
             outside = [threshold * common * line.scale ** 4]
-            for depth, fourth, strength in active:
+            for depth, fourth, strength, _ in active:
                 outside = plus(outside, scaled(times(depth, depth), -strength * (common // fourth)))
             found += [c for c in crossings_of(outside) if compare(c.root, low) >= 0 and compare(c.root, high) < 0]
         return found

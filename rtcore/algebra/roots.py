@@ -37,7 +37,7 @@ class Irrational:
     __slots__ = ()
 
     def sign_of(self, q: Poly) -> int:
-        shift = 64
+        shift = 16
         while True:
             n, exact = self.cell(shift)
             middle = value(q, n, shift)
@@ -185,7 +185,7 @@ def compare(a: Root, b: Root) -> int:
         return -compare(b, a)
     elif isinstance(b, Surd) and a.sign_of(b.poly) == 0 and a.sign_of(derivative(b.poly)) == b.branch:
         return 0
-    shift = 64
+    shift = 16
     while (i := a.cell(shift)[0]) == (j := b.cell(shift)[0]):
         shift *= 2
     return sign(i - j)
