@@ -1,4 +1,5 @@
-"""Exact numbers for packing: floats are rationals, so what a kernel is to rely on is computed in rationals and rounded once, to pairs."""
+"""Exact numbers for packing: floats are rationals, so what a kernel relies on is computed in rationals and rounded once, to two or three
+floats."""
 import functools
 from collections.abc import Iterable
 from fractions import Fraction
@@ -6,17 +7,16 @@ from fractions import Fraction
 import numpy as np
 
 
-def pairs(values: Iterable[Fraction | float]) -> list[float]:
-    """The numbers as double-double: all their high parts, then all their low parts. A number too large for float64 becomes inf."""
-    high, low = [], []
-    for value in values:
+def parts(values: Iterable[Fraction | float], count: int = 2) -> list[float]:
+    """The numbers as sums of `count` floats: all their leading parts, then all their second ones ... A number too large becomes inf."""
+    result, rest = [], list(values)
+    for _ in range(count):
         try:
-            high.append(float(value))
-            low.append(float(value - Fraction(high[-1])) if isinstance(value, Fraction) else 0.0)
+            result += (leading := [float(x) for x in rest])
         except OverflowError:
-            high.append(np.inf)
-            low.append(0.0)
-    return high + low
+            return [np.inf] * (count * len(rest))
+        rest = [x - Fraction(y) for x, y in zip(rest, leading)]
+    return result
 
 
 def rationals(values) -> list[Fraction]:

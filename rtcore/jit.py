@@ -22,7 +22,8 @@ import llvmlite.binding
 import numba
 import numpy
 import platformdirs
-from numba import config, njit
+from numba import config, njit, types
+from numba.extending import intrinsic
 
 PACKAGE = Path(__file__).parent
 KEEP_DAYS = 30
@@ -99,10 +100,20 @@ def kernel(function):
     """Compile at the first call, keep the machine code on disk, release the GIL while running; division by zero is IEEE's."""
     before, config.CACHE_DIR = config.CACHE_DIR, str(cache_folder(function.__module__))
     try:
-        return njit(cache=True, nogil=True, error_model="numpy")(function)
+        return njit(cache=True, nogil=True, error_model="numpy", forceinline=False)(function)    # or it takes that over from a caller
     finally:
         config.CACHE_DIR = before
 
 
 #: For the small functions that kernels are made of: always inlined, never cached on their own.
 inline = njit(nogil=True, error_model="numpy", forceinline=True)
+
+
+@intrinsic
+def out_of_line(typing_context):
+    """Called in a kernel: it is never inlined. For slow ways out, whose code in the midst of a hot loop costs it half its speed."""
+    def mark(context, builder, signature, arguments):
+        builder.function.attributes.add("noinline")
+        builder.function.attributes.add("cold")
+        return context.get_dummy_value()
+    return types.void(), mark

@@ -76,7 +76,7 @@ def divide(a, a1, b, b1):
 
 @inline
 def square_root(a, a1):
-    """Square root of a pair; error 4. 0 for 0, NaN below 0."""
+    """Square root of a pair, numbers only; error 4. 0 for 0, NaN below 0."""
     s = root(a)
     p, e = two_product(s, s)
     r = ((a - p) - e) + a1

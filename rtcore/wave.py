@@ -69,6 +69,25 @@ def record(rays, i, p, t, ok, opacity):
             add_where(rays.depth, i, ok, opacity[p])
 
 
+@inline
+def record_one(rays, i, p, t, opacity):
+    """`record` for ray i alone, t a float64; says whether it was kept."""
+    ray = rays.ray
+    start, far = ray[START, i], ray[T, i]
+    ray[T, i] = t       # rounded to the precision of the ray
+    t = ray[T, i]
+    ray[T, i] = far
+    if not (start < t <= far) or (t == far and rays.prim[i] <= p):
+        return False
+    if opacity.shape[0] == 0:
+        ray[T, i], rays.prim[i] = t, p
+    elif opacity[p] == OPAQUE:
+        ray[T, i], rays.prim[i] = DEAD, p
+    else:
+        rays.depth[i] += opacity[p]
+    return True
+
+
 class Wave(NamedTuple):
     """Rays with what they carry and what is found where they hit. n columns, as many as `rays` has."""
 

@@ -1,20 +1,31 @@
-"""Sphere: by the stable quadratic about the point of closest approach; under a transform that is no similarity, an ellipsoid.
+"""Sphere: by the stable quadratic about the point of closest approach; under a transform that doesn't keep it round, an ellipsoid.
 
 Discriminant from the perpendicular from the centre to the ray (Haines, Günther, Akenine-Möller, *Precision Improvements for Ray/Sphere
-Intersection*, Ray Tracing Gems ch. 7), roots by the lecture's pair: one without cancellation, the other from their product.
+Intersection*, Ray Tracing Gems ch. 7), roots by the lecture's pair: one without cancellation, the other from their product; what makes
+the answer certain is in `_ball.py`.
 """
+import functools
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
-from rtcore.fields import Number, Vec, Vector
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
-from rtcore.jit import inline, kernel
-from rtcore.lanes import along, dot, load, load3, root, select, splat3, with_sign
+from rtcore.exact import inverse, moved, parts
+from rtcore.expansions import LONG, expand, put_products
+from rtcore.fields import Number, Vec, Vector
+from rtcore.jit import inline, kernel, out_of_line
+from rtcore.lanes import any_lane, dot, load3, size, splat3, vec3, wide
+from rtcore.pairs import add, multiply, two_sum
 from rtcore.scene import Scale, Shape, invertible
-from rtcore.shapes.kind import (CENTER, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
-                                put_surface, similarity, unit_hit)
-from rtcore.wave import DX, OX, START, T, U, record
+from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet, settle, settle_one
+from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
+                                put_surface, unit_hit)
+from rtcore.wave import DX, OX, T, U
+
+
+#: Ellipsoids: column of the largest number of the matrix L into unit space; where L's parts begin in Table.exact, after the centre's.
+MOST, BACK_ROWS = OWN, 9
 
 
 class Sphere(Shape, frozen=True):
@@ -24,36 +35,83 @@ class Sphere(Shape, frozen=True):
     radius: Annotated[float, Number(above=0, help="distance of the surface from the centre", unit="scene units")]
 
     def kind(self, matrix: np.ndarray) -> Kind:
-        return ELLIPSOID if similarity(matrix) is None else SPHERE
+        return ELLIPSOID if round_scale(matrix) is None else SPHERE
 
     def pack(self, matrix: np.ndarray) -> Packed:
-        scale = similarity(matrix)
+        factor = round_scale(matrix)
         center = matrix[:3, :3] @ self.center + matrix[:3, 3]
-        if scale is not None:
-            radius = scale * self.radius
+        if factor is not None:
+            radius = factor * self.radius
             power = power_near(radius)
-            return Packed(SPHERE, np.array([[*center, radius / power, power, 1 / power]]))
+            if factor == 1 and not matrix[:3, 3].any() and matrix[0, 0] * matrix[1, 1] * matrix[2, 2] == 1:
+                exact = [*center, 0, 0, 0, radius / power, 0]
+            else:
+                exact = [*parts(moved(matrix, self.center)), *parts([Fraction(factor) * Fraction(self.radius) / Fraction(float(power))])]
+            return Packed(SPHERE, np.array([[*center, radius / power, power, 1 / power]]), exact=np.array([exact], float))
         local = matrix @ np.diag([self.radius] * 3 + [1.0])
         local[:3, 3] = center
-        return Packed(ELLIPSOID, placed(local, invertible(local))[None])
+        back = [x / Fraction(self.radius) for row in inverse(matrix) for x in row]
+        exact = [*parts(moved(matrix, self.center), 3), *parts(back, 3)]
+        return Packed(ELLIPSOID, placed(local, invertible(local), max(map(abs, back)))[None], exact=np.array([exact]))
+
+
+def round_scale(matrix: np.ndarray) -> float | None:
+    """The scale of a 4 x 4 matrix that, beside moving, only scales evenly, mirrors and swaps axes: exactly, so that a sphere stays one
+    to the last bit; else None. A turn by another angle is no similarity any more once it has been rounded."""
+    return _round_scale(matrix[:3, :3].tobytes())
+
+
+@functools.lru_cache(maxsize=4096)      # thousands of leaves share a few matrices, and are asked twice
+def _round_scale(linear: bytes) -> float | None:
+    m = np.abs(np.frombuffer(linear).reshape(3, 3))
+    there = m > 0
+    factor = float(m.max())
+    once = (there.sum(0) == 1).all() and (there.sum(1) == 1).all() and (m[there] == factor).all() and factor < np.inf
+    return factor if once else None
 
 
 @inline
-def hit_ball(rays, i, p, f, d, radius, power, side, opacity):
-    """Eight rays (f + t / power d) against the sphere of the radius about the origin. f, d: Vec3 of lanes; radius: lanes or a number."""
-    square = dot(d, d)
-    middle = -dot(f, d) / square
-    nearest = along(f, middle, d)
-    half = root((radius * radius - dot(nearest, nearest)) / square)         # NaN where the ray misses: then nothing below is true
-    far = middle + with_sign(half, middle)
-    near = (dot(f, f) - radius * radius) / (square * far)
-    near, far = near * power, far * power
-    enter, leave = select(middle > 0, near, far), select(middle > 0, far, near)
-    if side == 0:
-        t = select(enter > load(rays.ray, START, i), enter, leave)
-    else:
-        t = enter if side & 1 else leave
-    record(rays, i, p, t, half >= 0, opacity)
+def quick_sphere(rays, i, data, q):
+    """Whether any of eight rays may meet sphere q, by float32 arithmetic alone."""
+    d = load3(rays.ray, DX, i)
+    f = (load3(rays.ray, OX, i) - splat3(data, q, 0)) * data[q, 5]
+    return any_lane(may_meet(closest(f, d, data[q, 3], extent(f), U32)))
+
+
+@inline
+def hit_sphere(rays, i, p, data, exact, q, side, opacity):
+    """Eight rays against sphere q; as bits, those whose answer is not certain."""
+    unpower = np.float64(data[q, 5])
+    o, d = wide(load3(rays.ray, OX, i)), wide(load3(rays.ray, DX, i))
+    c, c1 = splat3(exact, q, 0), splat3(exact, q, 3)
+    f = ((o - c) - c1) * unpower
+    far = extent(f)
+    near = closest(f, d, exact[q, 6], far, U64)
+    todo = may_meet(near)
+    unsure = 0
+    if any_lane(todo):
+        x, x1 = two_sum(o.x, -c.x)
+        y, y1 = two_sum(o.y, -c.y)
+        z, z1 = two_sum(o.z, -c.z)
+        zero = 0 * x
+        unsure = settle(rays, i, p, todo, near, vec3(x, y, z) * unpower, (vec3(x1, y1, z1) - c1) * unpower, d, vec3(zero, zero, zero),
+                        exact[q, 6] + zero, exact[q, 7] + zero, np.float64(data[q, 4]), unpower, far, extent(d), side, opacity)
+    return unsure
+
+
+@kernel
+def settle_sphere(rays, i, p, table, q, opacity):
+    """Ray i against sphere q, the slow and certain way."""
+    out_of_line()
+    exact, terms = table.exact, np.empty(3 + LONG)
+    f, d = np.zeros((3, LONG)), np.zeros((3, LONG))
+    for k in range(3):
+        terms[0], terms[1], terms[2] = rays.ray[OX + k, i], -exact[q, k], -exact[q, 3 + k]
+        for j in range(3):
+            terms[j] *= table.data[q, 5]
+        expand(terms, 3, f[k])
+        d[k, 0] = rays.ray[DX + k, i]
+    settle_one(rays, i, p, f, d, exact[q, 6], exact[q, 7], np.float64(table.data[q, 4]), table.side[q], opacity)
 
 
 @kernel
@@ -64,13 +122,13 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
-                center, power = splat3(table.data, q, 0), table.data[q, 4]
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
-                        i = start + g * 8
-                        d = load3(rays.ray, DX, i)
-                        f = (load3(rays.ray, OX, i) - center) * table.data[q, 5]
-                        hit_ball(rays, i, first + q, f, d, table.data[q, 3] + 0 * d.x, power, table.side[q], opacity)
+                    i = start + g * 8
+                    if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
+                        unsure = hit_sphere(rays, i, first + q, table.data, table.exact, q, table.side[q], opacity)
+                        while unsure:
+                            settle_sphere(rays, i + lowest(unsure), first + q, table, q, opacity)
+                            unsure &= unsure - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -97,6 +155,88 @@ def globe(out, x, y, z):
     return around(out, y, x), np.arccos(min(max(-z, -1.0), 1.0)) / np.pi if out.shape[0] > U else 0.0
 
 
+@inline
+def hit_ellipsoid(rays, i, p, table, q, opacity):
+    """Eight rays against ellipsoid q: in its unit space a ball."""
+    data, exact = table.data, table.exact
+    most = np.float64(data[q, MOST])
+    if data.itemsize == 4:
+        g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
+        f, d = into(data, q, g), into(data, q, v)
+        if not any_lane(may_meet(closest(f, d, 1, reach(data[q, MOST], g, v, f, d), U32))):
+            return
+    o, v = wide(load3(rays.ray, OX, i)), wide(load3(rays.ray, DX, i))
+    g = (o - splat3(exact, q, 0)) - splat3(exact, q, 3)
+    f, d = into_plain(exact, q, g), into_plain(exact, q, v)
+    far = reach(most, g, v, f, d)
+    near = closest(f, d, 1, far, U64)
+    todo = may_meet(near)
+    if any_lane(todo):
+        c, c1 = splat3(exact, q, 0), splat3(exact, q, 3)
+        x, x1 = two_sum(o.x, -c.x)
+        y, y1 = two_sum(o.y, -c.y)
+        z, z1 = two_sum(o.z, -c.z)
+        g, g1 = vec3(x, y, z), vec3(x1, y1, z1) - c1
+        zero = 0 * x
+        fx, fx1 = row(exact, q, 0, g, g1)
+        fy, fy1 = row(exact, q, 1, g, g1)
+        fz, fz1 = row(exact, q, 2, g, g1)
+        dx, dx1 = row(exact, q, 0, v, vec3(zero, zero, zero))
+        dy, dy1 = row(exact, q, 1, v, vec3(zero, zero, zero))
+        dz, dz1 = row(exact, q, 2, v, vec3(zero, zero, zero))
+        unsure = settle(rays, i, p, todo, near, vec3(fx, fy, fz), vec3(fx1, fy1, fz1), vec3(dx, dy, dz), vec3(dx1, dy1, dz1),
+                        1 + zero, zero, 1.0, 1.0, far, most * extent(v), table.side[q], opacity)
+        for k in range(8):
+            if (unsure >> k) & 1:
+                settle_ellipsoid(rays, i + k, p, table, q, opacity)
+
+
+@inline
+def into_plain(exact, q, v):
+    """L v by the high parts of L."""
+    a, b, c = splat3(exact, q, BACK_ROWS), splat3(exact, q, BACK_ROWS + 3), splat3(exact, q, BACK_ROWS + 6)
+    return vec3(a.x * v.x + a.y * v.y + a.z * v.z, b.x * v.x + b.y * v.y + b.z * v.z, c.x * v.x + c.y * v.y + c.z * v.z)
+
+
+@inline
+def row(exact, q, k, v, v1):
+    """Row k of L times (v + v1), as a pair."""
+    a, b = BACK_ROWS + 3 * k, BACK_ROWS + 9 + 3 * k
+    x, x1 = multiply(v.x, v1.x, exact[q, a] + 0 * v.x, exact[q, b] + 0 * v.x)
+    y, y1 = multiply(v.y, v1.y, exact[q, a + 1] + 0 * v.x, exact[q, b + 1] + 0 * v.x)
+    z, z1 = multiply(v.z, v1.z, exact[q, a + 2] + 0 * v.x, exact[q, b + 2] + 0 * v.x)
+    s, s1 = add(x, x1, y, y1)
+    return add(s, s1, z, z1)
+
+
+@inline
+def reach(most, g, v, f, d):
+    """What the errors of f = L g and d = L v are roundings of, `most` being the largest number of L: that of f, and that of d where the
+    ray comes closest."""
+    return most * (extent(g) + extent(v) * size(dot(f, d) / dot(d, d)))
+
+
+@kernel
+def settle_ellipsoid(rays, i, p, table, q, opacity):
+    """Ray i against ellipsoid q, the slow and certain way."""
+    out_of_line()
+    exact, terms = table.exact, np.empty(36 + LONG)
+    g, f, d = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG))
+    for k in range(3):
+        terms[0], terms[1], terms[2], terms[3] = rays.ray[OX + k, i], -exact[q, k], -exact[q, 3 + k], -exact[q, 6 + k]
+        expand(terms, 4, g[k])
+    for k in range(3):
+        n, m, more = 0, 0, np.empty(7 * LONG * LONG)
+        for j in range(3):
+            a = BACK_ROWS + 3 * k + j
+            factor = exact[q, a], exact[q, a + 9], exact[q, a + 18]
+            m = put_products(more, m, 1.0, factor, g[j])
+            n = put_products(terms, n, 1.0, factor, (np.float64(rays.ray[DX + j, i]), 0.0))
+        expand(more, m, f[k])
+        expand(terms, n, d[k])
+    settle_one(rays, i, p, f, d, 1.0, 0.0, 1.0, table.side[q], opacity)
+
+
 @kernel
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
@@ -107,10 +247,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
-                        i = start + g * 8
-                        f = into(table.data, q, load3(rays.ray, OX, i) - splat3(table.data, q, CENTER))
-                        d = into(table.data, q, load3(rays.ray, DX, i))
-                        hit_ball(rays, i, first + q, f, d, 1 + 0 * d.x, 1, table.side[q], opacity)
+                        hit_ellipsoid(rays, start + g * 8, first + q, table, q, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
