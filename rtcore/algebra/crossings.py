@@ -10,12 +10,11 @@ from rtcore.algebra.roots import nearest
 from rtcore.fields import FieldError
 from rtcore.flatten import DTYPES, place as where
 from rtcore.scene import Node, Scene, Shape
-from rtcore.settings import Settings
 from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 FINDERS = {
     Sphere: curved.sphere, Plane: flat.plane, Triangle: flat.triangle, Mesh: flat.mesh, Polygon: flat.polygon, Box: flat.box,
-    Cylinder: curved.frustum, Cone: curved.frustum, Quadric: curved.quadric, Torus: curved.torus, Polyhedron: flat.polyhedron,
+    Cylinder: curved.cylinder, Cone: curved.cone, Quadric: curved.quadric, Torus: curved.torus, Polyhedron: flat.polyhedron,
     Blob: curved.blob,
 }
 DIGITS = {"f64": (53, -1074), "f32": (24, -149)}      # of the precision: binary digits, power of the smallest number
@@ -33,7 +32,8 @@ def crossings(shape: Shape | Node | Scene, origin, direction, precision: str = "
 
     Raises FieldError for arrays of another shape, numbers that are not finite, a direction of 0.
     """
-    Settings(precision=precision)
+    if precision not in tuple(DTYPES):
+        raise FieldError("one of " + ", ".join(DTYPES), precision, "precision")
     dtype = DTYPES[precision]
     o, d = _vector(origin, "origin", dtype), _vector(direction, "direction", dtype)
     if not any(d):

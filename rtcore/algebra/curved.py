@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from rtcore.algebra.lines import Line, Place, dot, minus, times as stretched
-from rtcore.algebra.polynomials import Poly, plus, scaled, sign, times
+from rtcore.algebra.polynomials import Poly, plus, rootless, scaled, sign, times
 from rtcore.algebra.roots import Rational, Root, compare, real_roots
 
 Find = Callable[[Line], list["Crossing"]]
@@ -76,9 +76,16 @@ def quadric(shape, place: Place) -> Find:
     return find
 
 
-def frustum(shape, place: Place) -> Find:
-    """A cylinder or cone. With q = p - base, A = apex - base and h = q · A its wall is A·A (A·A |q|² - h²) = (r₀ A·A + (r₁ - r₀) h)²."""
-    radii = (shape.radius, shape.radius) if hasattr(shape, "radius") else (shape.base_radius, shape.apex_radius)
+def cylinder(shape, place: Place) -> Find:
+    return frustum(shape, (shape.radius, shape.radius), place)
+
+
+def cone(shape, place: Place) -> Find:
+    return frustum(shape, (shape.base_radius, shape.apex_radius), place)
+
+
+def frustum(shape, radii, place: Place) -> Find:
+    """With q = p - base, A = apex - base and h = q · A its wall is A·A (A·A |q|² - h²) = (r₀ A·A + (r₁ - r₀) h)²."""
     numbers, shift = place.whole(*shape.base, *shape.apex, *radii)
     base, axis, (r0, r1) = numbers[:3], minus(numbers[3:6], numbers[:3]), numbers[6:]
     length2 = dot(axis, axis)
@@ -150,6 +157,7 @@ def blob(shape, place: Place) -> Find:
             outside = [threshold * common * line.scale ** 4]
             for depth, fourth, strength, _ in active:
                 outside = plus(outside, scaled(times(depth, depth), -strength * (common // fourth)))
-            found += [c for c in crossings_of(outside) if compare(c.root, low) >= 0 and compare(c.root, high) < 0]
+            if not rootless(outside, low.cell(24)[0], high.cell(24)[0] + 1, 24):
+                found += [c for c in crossings_of(outside) if compare(c.root, low) >= 0 and compare(c.root, high) < 0]
         return found
     return find

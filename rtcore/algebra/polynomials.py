@@ -62,6 +62,20 @@ def value(p: Poly, n: int, shift: int) -> int:
     return result
 
 
+def rootless(p: Poly, low: int, high: int, shift: int) -> bool:
+    """Whether p has no root from low / 2^shift to high / 2^shift, if it is easily seen: its value in the middle outweighs all the rest of
+    its Taylor series there. For a shift of at least 0."""
+    middle, half = low + high, high - low       # over 2^(shift + 1)
+    series = [c << (shift + 1) * (len(p) - 1 - i) for i, c in enumerate(p)]
+    for i in range(len(p) - 1):
+        for k in range(len(p) - 2, i - 1, -1):
+            series[k] += middle * series[k + 1]
+    rest = 0
+    for c in reversed(series[1:]):
+        rest = (rest + abs(c)) * half
+    return abs(series[0]) > rest
+
+
 def remainder(a: Poly, b: Poly) -> Poly:
     """What is left of a after division by b, times some positive number that keeps it whole."""
     lead, a = b[-1], list(a)
