@@ -2,6 +2,6 @@
 
 A command has NAME, HELP in one line, `arguments(parser)` and `run(args, parser) -> exit code`. None of them imports Qt.
 """
-from app.commands import check, plan, render, warm
+from app.commands import check, plan, render, stability, warm
 
-COMMANDS = (render, plan, check, warm)
+COMMANDS = (render, plan, stability, check, warm)

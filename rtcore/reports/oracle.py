@@ -6,6 +6,7 @@ solved as linear systems, a box is six rectangles. At 50 digits cancellation is 
 """
 import functools
 import warnings
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -54,7 +55,8 @@ def cross(a, b):
 
 
 def unit(a):
-    return times(1 / mp.sqrt(dot(a, a)), a)
+    """At length 1; the normal of a singular point, 0, stays 0."""
+    return times(1 / mp.sqrt(dot(a, a)), a) if any(a) else a
 
 
 def determinant(a, b, c):
@@ -65,8 +67,46 @@ def quadratic(a, b, c) -> list:
     """Real roots of a t² + 2 b t + c; a double one twice."""
     if a == 0:
         return [-c / (2 * b)] if b != 0 else []
+    if c == 0:      # exactly, not but for a root's last digit
+        return sorted([mp.mpf(0), -2 * b / a])
     square = b * b - a * c
     return [] if square < 0 else [(-b - mp.sqrt(square)) / a, (-b + mp.sqrt(square)) / a]
+
+
+def real_roots(coefficients, tolerance) -> list:
+    """Real roots of a polynomial, highest power first, each as often as it counts: those whose imaginary part is less than the tolerance,
+    relative to 1 + |root|."""
+    with warnings.catch_warnings():     # newer releases of mpmath want the order of coefficients said, older ones don't know the word
+        warnings.simplefilter("ignore", DeprecationWarning)
+        try:
+            roots = mp.polyroots(coefficients, maxsteps=100, extraprec=400)
+        except mp.NoConvergence:        # roots of high multiplicity: those of p / gcd(p, p') are simple, the rest are the gcd's
+            whole = [Fraction(*mpmath.libmp.to_rational(x._mpf_)) for x in coefficients]
+            common = gcd(whole, [x * (len(whole) - 1 - k) for k, x in enumerate(whole[:-1])])
+            if len(common) == 1:
+                raise
+            parts = [[mp.mpf(x.numerator) / x.denominator for x in part] for part in (divided(whole, common)[0], common)]
+            return [root for part in parts if len(part) > 1 for root in real_roots(part, tolerance)]
+    return [mp.re(root) for root in roots if abs(mp.im(root)) <= tolerance * (1 + abs(root))]
+
+
+def divided(a: list, b: list) -> tuple[list, list]:
+    """Quotient and remainder of two polynomials of fractions, highest power first."""
+    a, quotient = list(a), []
+    while len(a) >= len(b):
+        quotient.append(a[0] / b[0])
+        a = [x - quotient[-1] * y for x, y in zip(a, b + [0] * (len(a) - len(b)))][1:]
+    return quotient, a
+
+
+def gcd(a: list, b: list) -> list:
+    """The greatest common divisor of two polynomials of fractions, its leading coefficient 1."""
+    while b:
+        remainder = divided(a, b)[1]
+        while remainder and remainder[0] == 0:
+            remainder.pop(0)
+        a, b = b, remainder
+    return [x / a[0] for x in a]
 
 
 # --- the shapes: (t, normal of any length) of every crossing with o + t d ---
@@ -192,17 +232,15 @@ def _quadric(s: Quadric, o, d):
 def _torus(s: Torus, o, d):
     """The quartic's raw coefficients, all its complex roots, the real ones of them."""
     big, small = mp.mpf(s.major_radius), mp.mpf(s.minor_radius)
+    speed = mp.sqrt(dot(d, d)) / (big + small)      # so that a root that is not real can be told by its size
+    d = times(1 / speed, d)
     dd, od, k = dot(d, d), dot(o, d), dot(o, o) + big ** 2 - small ** 2
     flat = [d[0] ** 2 + d[1] ** 2, 2 * (o[0] * d[0] + o[1] * d[1]), o[0] ** 2 + o[1] ** 2]
     whole = [dd * dd, 4 * dd * od, 4 * od ** 2 + 2 * dd * k, 4 * od * k, k * k]
-    with warnings.catch_warnings():     # newer releases of mpmath want the order of coefficients said, older ones don't know the word
-        warnings.simplefilter("ignore", DeprecationWarning)
-        roots = mp.polyroots([w - 4 * big ** 2 * f for w, f in zip(whole, [0, 0, *flat])], maxsteps=500, extraprec=400)
-    for root in roots:
-        if abs(mp.im(root)) <= mp.mpf(10) ** -30 * (1 + abs(root)):
-            x, y, z = add(o, times(mp.re(root), d))
-            slope = 4 * (x * x + y * y + z * z + big ** 2 - small ** 2)
-            yield mp.re(root), (slope * x - 8 * big ** 2 * x, slope * y - 8 * big ** 2 * y, slope * z)
+    for t in real_roots([w - 4 * big ** 2 * f for w, f in zip(whole, [0, 0, *flat])], mp.mpf(10) ** -30):
+        x, y, z = add(o, times(t, d))
+        slope = 4 * (x * x + y * y + z * z + big ** 2 - small ** 2)
+        yield t / speed, (slope * x - 8 * big ** 2 * x, slope * y - 8 * big ** 2 * y, slope * z)
 
 
 def _polyhedron(s: Polyhedron, o, d):
@@ -220,6 +258,8 @@ def _blob(s: Blob, o, d):
     """The ends of all elements' spheres cut the ray; between them the raw quartic's complex roots, where the field can reach at all."""
     elements = [(vector(c), mp.mpf(r), mp.mpf(w)) for c, r, w in s.elements]
     threshold, forms = mp.mpf(s.threshold), []
+    speed = mp.sqrt(dot(d, d)) / max(r for _, r, _ in elements)     # as for the torus
+    d = times(1 / speed, d)
     for center, radius, strength in elements:       # 1 - |p - center|²/radius² as a t² + 2 b t + c
         f = sub(o, center)
         forms.append((-dot(d, d) / radius ** 2, -dot(f, d) / radius ** 2, 1 - dot(f, f) / radius ** 2, strength))
@@ -238,18 +278,14 @@ def _blob(s: Blob, o, d):
             continue
         while whole[0] == 0:
             whole.pop(0)
-        with warnings.catch_warnings():     # as for the torus
-            warnings.simplefilter("ignore", DeprecationWarning)
-            roots = mp.polyroots(whole, maxsteps=500, extraprec=400)
-        for root in roots:
-            t = mp.re(root)
-            if abs(mp.im(root)) <= mp.mpf(10) ** -20 * (1 + abs(root)) and low <= t < high:
+        for t in real_roots(whole, mp.mpf(10) ** -20):
+            if low <= t < high:
                 normal = (mp.mpf(0),) * 3
                 for (center, radius, _), (a, b, c, strength) in zip(elements, forms):
                     w = (a * t + 2 * b) * t + c
                     if w > 0:
                         normal = add(normal, times(strength * w / radius ** 2, sub(add(o, times(t, d)), center)))
-                yield t, normal
+                yield t / speed, normal
 
 
 TWINS = {Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone,
