@@ -175,6 +175,11 @@ class Text(Field):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Formula(Text):
+    """A formula, as a person types it; the shape that has one says what may stand in it."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Vectors(Field):
     """At least ``least`` points, each of three finite numbers."""
 

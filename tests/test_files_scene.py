@@ -18,6 +18,7 @@ from rtcore.lights import LIGHTS
 from rtcore.scene import MOST_NESTED, TRANSFORMS, Background, Fog, Material, Node, Rows, Scene
 from rtcore.shapes import SHAPES, Box, Mesh, Sphere
 from rtcore.shapes.blob import Elements
+from rtcore.shapes.implicit import Expression
 from rtcore.shapes.polyhedron import Planes
 from rtcore.shapes.triangle import Array
 
@@ -61,6 +62,7 @@ def values(field):
         Rows: lambda: st.tuples(*[st.tuples(*[finite] * 4)] * 3).map(lambda rows: (*rows, (0, 0, 0, 1))),
         Array: lambda: st.none(), Numbers: lambda: st.tuples(*[finite] * field.count),
         Elements: lambda: st.lists(st.tuples(st.tuples(finite, finite, finite), st.floats(1e-9, 1e9), finite), min_size=1, max_size=3),
+        Expression: lambda: st.sampled_from(["x", "x^2 + y^2 - 1e-3", " sin(x)*pi\n- smin(y, z, .5)"]),
         Planes: lambda: st.lists(st.tuples(st.tuples(finite, finite, finite), st.tuples(finite, finite, finite)), min_size=1, max_size=3),
     }[type(field)]()
 
