@@ -13,16 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import rtcore
-from rtcore import Blob, Matrix, Mesh, Node, Polygon, Rotate, Scale, Scene, Shear, Sphere, Torus, Translate
+from rtcore import (Blob, Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Rotate, Scale, Scene, Shear,
+                    Sphere, Torus, Translate, Triangle)
 
 from naive import crossings, mp
 from test_shapes import EXAMPLES, rays_at, transform
 
 DTYPE = {"f64": np.float64, "f32": np.float32}
 OF_CLASS = {name: sum(type(other) is type(shape) for other in EXAMPLES.values()) for name, shape in EXAMPLES.items()}
+EXACT = {Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone, Quadric, Torus, Polyhedron, Blob}      # whose roots are algebraic
 SLOW = {Torus: 300, Blob: 120}      # their twins find the complex roots of quartics
 TILTED = Polygon(((1, 0, 0), (0, 1, 0), (0, 0, 1)))
-SHAPES = EXAMPLES | {"tilted polygon": TILTED}
+SHAPES = {name: shape for name, shape in EXAMPLES.items() if type(shape) in EXACT} | {"tilted polygon": TILTED}
 
 
 def lines_for(shape, name: str) -> int:
@@ -80,10 +82,10 @@ def test_crossings_are_the_twins(name, precision):
 
 
 @pytest.mark.parametrize("sides", ["front", "back"])
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", SHAPES)
 def test_sides(name, sides):
     rng = np.random.default_rng(len(name))
-    shape, met = msgspec.structs.replace(EXAMPLES[name], sides=sides), 0
+    shape, met = msgspec.structs.replace(SHAPES[name], sides=sides), 0
     for kind in ("mirrored", "sheared"):
         matrix = transform(rng, kind)
         node = Node(shape=shape, transform=(Matrix(matrix.tolist()),))
@@ -91,16 +93,16 @@ def test_sides(name, sides):
             true = [float(c.t) for c in crossings(shape, matrix, o, d)]
             assert rtcore.crossings(node, o, d).tolist() == true
             met += len(true)
-    assert met >= 2
+    assert met >= 1
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", SHAPES)
 def test_the_first_crossing_is_what_intersect_finds(name, precision):
     rng = np.random.default_rng(len(name))
     for kind in ("rigid", "stretched"):
         matrix = transform(rng, kind)
-        scene = Scene(objects=[Node(shape=EXAMPLES[name], transform=[Matrix(matrix.tolist())])])
+        scene = Scene(objects=[Node(shape=SHAPES[name], transform=[Matrix(matrix.tolist())])])
         origins, directions = rays_at(rng, matrix, 60, precision)
         found = rtcore.intersect(scene, origins, directions, precision=precision).t
         for o, d, t in zip(origins, directions, found):
@@ -115,7 +117,7 @@ def test_a_mesh_of_many_triangles():
     rng = np.random.default_rng(5)
     corners = rng.normal(size=(400, 3)) * 3 + 100
     mesh = Mesh((corners[:, None] + rng.normal(size=(400, 3, 3))).reshape(-1, 3), np.arange(1200).reshape(-1, 3))
-    parts = Scene(objects=[rtcore.Triangle(*map(tuple, mesh.vertices[face])) for face in mesh.faces])
+    parts = Scene(objects=[Triangle(*map(tuple, mesh.vertices[face])) for face in mesh.faces])
     met = 0
     for k in range(12):
         target = corners[k]
@@ -124,6 +126,42 @@ def test_a_mesh_of_many_triangles():
         assert found.tolist() == rtcore.crossings(parts, o, target - o).tolist()
         met += len(found)
     assert met > 20 and not len(rtcore.crossings(mesh, (0, 0, 0), (1, -1, 0)))
+
+
+CUBE = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+CUBE_FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7),
+              (1, 7, 3)]
+AXES = [tuple(s * (j == k) for j in range(3)) for k in range(3) for s in (-1, 1)]
+OCTAHEDRON = [(0, 0, 1), (1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
+OCTAHEDRON_FACES = [face for k in range(1, 5) for face in ((0, k, k % 4 + 1), (5, k % 4 + 1, k))]
+
+
+def grid_lines(seed: int, n: int):
+    """Lines of few bits: through corners, edges, along edges and faces, tangent to what is round."""
+    rng = np.random.default_rng(seed)
+    o, d = rng.integers(-4, 5, (n, 3)) / 2, rng.integers(-3, 4, (n, 3))
+    return [(a, b) for a, b in zip(o, d) if b.any()]
+
+
+def test_solids_made_in_several_ways_are_the_same():
+    """A cube as a box, a mesh and planes, an octahedron as a mesh and planes: whatever the line touches."""
+    corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    for alike in ((Box((-1, -1, -1), (1, 1, 1)), Mesh(CUBE, CUBE_FACES), Polyhedron([(axis, axis) for axis in AXES])),
+                  (Mesh(OCTAHEDRON, OCTAHEDRON_FACES), Polyhedron([((corner[0], 0, 0), corner) for corner in corners]))):
+        counts = {0: 0, 2: 0}
+        for o, d in grid_lines(1, 2000):
+            found = [rtcore.crossings(shape, o, d).tolist() for shape in alike]
+            assert found[1:] == found[:-1], (o.tolist(), d.tolist())
+            counts[len(found[0])] += 1
+        assert min(counts.values()) > 150
+
+
+@pytest.mark.parametrize("shape", [Cylinder((0, 0, -1), (0, 0, 1), 1), Cylinder((0, -1, 0), (0.5, 1, 1), 1.5),
+                                   Cone((0, 0, -1), 2, (0, 0, 1), 1), Cone((-1, 0, 0), 0.5, (1, 0, 0), 2.5)])
+def test_a_convex_solid_is_crossed_twice_or_not_at_all(shape):
+    """Rims, walls touched and lines within walls included."""
+    counts = [len(rtcore.crossings(shape, o, d)) for o, d in grid_lines(2, 2000)]
+    assert set(counts) == {0, 2} and min(counts.count(0), counts.count(2)) > 200
 
 
 names, seeds = st.sampled_from(sorted(SHAPES)), st.integers(0, 2**32)
