@@ -8,10 +8,10 @@ import numpy as np
 
 from rtcore.expansions import LONG, expand, put_products, solve_quadratic
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import along, any_lane, bits, dot, fma, load, root, rounded, select, size, wide, with_sign
+from rtcore.lanes import along, any_lane, dot, fma, root, select, size, with_sign
 from rtcore.pairs import ordered_sum, square, two_product, two_sum
 from rtcore.shapes.kind import BACK, FRONT
-from rtcore.wave import SLOW, START, T, record, record_one
+from rtcore.wave import SLOW, START, record_one
 
 U64, U32 = 2.0 ** -53, 2.0 ** -24
 
@@ -72,12 +72,13 @@ def polish(f, f1, v, v1, s, radius, radius1, far, speed):
 
 
 @inline
-def settle(rays, i, p, todo, near, f, f1, v, v1, radius, radius1, power, unpower, far, speed, side, opacity):
-    """Record where the lanes `todo` of rays i .. i+7 cross a ball, lengths counted in `power`, a power of two, with inverse `unpower`;
-    `near` is what `closest` gave. Returns as bits the lanes for which this arithmetic isn't certain."""
+def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, side):
+    """Where the lanes `todo` first cross a ball between start and end; `near` is what `closest` gave. Returns s, the lanes that found
+    it, and those for which this arithmetic isn't certain.
+
+    No array may come in here: numba counts references to those that a function with branches is given, in the hottest of loops.
+    """
     inverse, middle, off, fuzz = near
-    like = load(rays.ray, T, i)
-    start, end = wide(load(rays.ray, START, i)) * unpower, wide(like) * unpower
     sure = off > 1024 * fuzz
     unsure = todo & ~sure
     todo = todo & sure
@@ -85,25 +86,28 @@ def settle(rays, i, p, todo, near, f, f1, v, v1, radius, radius1, power, unpower
     outer = middle + with_sign(half, middle)
     inner = (dot(f, f) - radius * radius) * inverse / outer
     slack = half * 2.0 ** -10       # at least what plain arithmetic is off
+    s = 0 * middle
+    found = todo & ~todo
     if side & BACK == 0:
-        s = select(middle > 0, inner, outer)
-        todo = todo & (s - slack < end)
-        want = todo & (s + slack > start)
+        enter = select(middle > 0, inner, outer)
+        todo = todo & (enter - slack < end)
+        want = todo & (enter + slack > start)
         if any_lane(want):
-            t, slope, left = polish(f, f1, v, v1, s, radius, radius1, far, speed)
-            ok = certain(t, slope, left, start, end)
+            s, slope, left = polish(f, f1, v, v1, enter, radius, radius1, far, speed)
+            ok = certain(s, slope, left, start, end)
             unsure = unsure | (want & ~ok)
-            record(rays, i, p, rounded(t * power, like), want & ok, opacity)
-            todo = todo & ~(want & (~ok | (t > start)))
+            found = want & ok & (s > start)
+            todo = todo & ~(want & ~ok) & ~found
     if side & FRONT == 0:
-        s = select(middle > 0, outer, inner)
-        want = todo & (s + slack > start) & (s - slack < end)
+        leave = select(middle > 0, outer, inner)
+        want = todo & (leave + slack > start) & (leave - slack < end)
         if any_lane(want):
-            t, slope, left = polish(f, f1, v, v1, s, radius, radius1, far, speed)
-            ok = certain(t, slope, left, start, end)
+            r, slope, left = polish(f, f1, v, v1, leave, radius, radius1, far, speed)
+            ok = certain(r, slope, left, start, end)
             unsure = unsure | (want & ~ok)
-            record(rays, i, p, rounded(t * power, like), want & ok, opacity)
-    return bits(unsure)
+            s = select(want & ok, r, s)
+            found = found | (want & ok)
+    return s, found, unsure
 
 
 @inline

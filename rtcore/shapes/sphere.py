@@ -15,13 +15,13 @@ from rtcore.exact import inverse, moved, parts
 from rtcore.expansions import LONG, expand, put_products
 from rtcore.fields import Number, Vec, Vector
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, dot, load3, size, splat3, vec3, wide
+from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
 from rtcore.pairs import add, multiply, two_sum
 from rtcore.scene import Scale, Shape, invertible
-from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet, settle, settle_one
+from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
 from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, unit_hit)
-from rtcore.wave import DX, OX, T, U
+from rtcore.wave import DX, OX, START, T, U, record
 
 
 #: Ellipsoids: column of the largest number of the matrix L into unit space; where L's parts begin in Table.exact, after the centre's.
@@ -79,24 +79,25 @@ def quick_sphere(rays, i, data, q):
 
 
 @inline
-def hit_sphere(rays, i, p, data, exact, q, side, opacity):
-    """Eight rays against sphere q; as bits, those whose answer is not certain."""
-    unpower = np.float64(data[q, 5])
-    o, d = wide(load3(rays.ray, OX, i)), wide(load3(rays.ray, DX, i))
-    c, c1 = splat3(exact, q, 0), splat3(exact, q, 3)
-    f = ((o - c) - c1) * unpower
+def approach(ray, i, data, exact, q):
+    """Of eight rays and sphere q: the origins seen from the centre in units of the sphere's, a bound on their size, what `closest` says."""
+    f = ((wide(load3(ray, OX, i)) - splat3(exact, q, 0)) - splat3(exact, q, 3)) * np.float64(data[q, 5])
     far = extent(f)
-    near = closest(f, d, exact[q, 6], far, U64)
-    todo = may_meet(near)
-    unsure = 0
-    if any_lane(todo):
-        x, x1 = two_sum(o.x, -c.x)
-        y, y1 = two_sum(o.y, -c.y)
-        z, z1 = two_sum(o.z, -c.z)
-        zero = 0 * x
-        unsure = settle(rays, i, p, todo, near, vec3(x, y, z) * unpower, (vec3(x1, y1, z1) - c1) * unpower, d, vec3(zero, zero, zero),
-                        exact[q, 6] + zero, exact[q, 7] + zero, np.float64(data[q, 4]), unpower, far, extent(d), side, opacity)
-    return unsure
+    return far, closest(f, wide(load3(ray, DX, i)), exact[q, 6], far, U64)
+
+
+@inline
+def meet(ray, i, data, exact, q, todo, far, near, side):
+    """Where the lanes `todo` first meet sphere q: as `choose`, t in the rays' precision."""
+    o, d, c, unpower = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0), np.float64(data[q, 5])
+    x, x1 = two_sum(o.x, -c.x)
+    y, y1 = two_sum(o.y, -c.y)
+    z, z1 = two_sum(o.z, -c.z)
+    f, f1 = vec3(x, y, z) * unpower, (vec3(x1, y1, z1) - splat3(exact, q, 3)) * unpower
+    end, zero = load(ray, T, i), 0 * x
+    s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero, far, extent(d),
+                              wide(load(ray, START, i)) * unpower, wide(end) * unpower, side)
+    return rounded(s * np.float64(data[q, 4]), end), found, unsure
 
 
 @kernel
@@ -125,10 +126,15 @@ def intersect(rays, n, tree, table, first, opacity):
                 for g in range(PACKET // 8):
                     i = start + g * 8
                     if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
-                        unsure = hit_sphere(rays, i, first + q, table.data, table.exact, q, table.side[q], opacity)
-                        while unsure:
-                            settle_sphere(rays, i + lowest(unsure), first + q, table, q, opacity)
-                            unsure &= unsure - 1
+                        far, near = approach(rays.ray, i, table.data, table.exact, q)
+                        todo = may_meet(near)
+                        if any_lane(todo):
+                            t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
+                            record(rays, i, first + q, t, found, opacity)
+                            late = bits(unsure)
+                            while late:
+                                settle_sphere(rays, i + lowest(late), first + q, table, q, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -156,39 +162,44 @@ def globe(out, x, y, z):
 
 
 @inline
-def hit_ellipsoid(rays, i, p, table, q, opacity):
-    """Eight rays against ellipsoid q: in its unit space a ball."""
-    data, exact = table.data, table.exact
-    most = np.float64(data[q, MOST])
-    if data.itemsize == 4:
-        g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
-        f, d = into(data, q, g), into(data, q, v)
-        if not any_lane(may_meet(closest(f, d, 1, reach(data[q, MOST], g, v, f, d), U32))):
-            return
-    o, v = wide(load3(rays.ray, OX, i)), wide(load3(rays.ray, DX, i))
-    g = (o - splat3(exact, q, 0)) - splat3(exact, q, 3)
+def quick_ellipsoid(rays, i, data, q):
+    """Whether any of eight rays may meet ellipsoid q, by float32 arithmetic alone."""
+    g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
+    f, d = into(data, q, g), into(data, q, v)
+    return any_lane(may_meet(closest(f, d, 1, reach(data[q, MOST], g, v, f, d), U32)))
+
+
+@inline
+def approach_ellipsoid(ray, i, data, exact, q):
+    """As `approach`, in the unit space of ellipsoid q."""
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, 0)) - splat3(exact, q, 3), wide(load3(ray, DX, i))
     f, d = into_plain(exact, q, g), into_plain(exact, q, v)
-    far = reach(most, g, v, f, d)
-    near = closest(f, d, 1, far, U64)
-    todo = may_meet(near)
-    if any_lane(todo):
-        c, c1 = splat3(exact, q, 0), splat3(exact, q, 3)
-        x, x1 = two_sum(o.x, -c.x)
-        y, y1 = two_sum(o.y, -c.y)
-        z, z1 = two_sum(o.z, -c.z)
-        g, g1 = vec3(x, y, z), vec3(x1, y1, z1) - c1
-        zero = 0 * x
-        fx, fx1 = row(exact, q, 0, g, g1)
-        fy, fy1 = row(exact, q, 1, g, g1)
-        fz, fz1 = row(exact, q, 2, g, g1)
-        dx, dx1 = row(exact, q, 0, v, vec3(zero, zero, zero))
-        dy, dy1 = row(exact, q, 1, v, vec3(zero, zero, zero))
-        dz, dz1 = row(exact, q, 2, v, vec3(zero, zero, zero))
-        unsure = settle(rays, i, p, todo, near, vec3(fx, fy, fz), vec3(fx1, fy1, fz1), vec3(dx, dy, dz), vec3(dx1, dy1, dz1),
-                        1 + zero, zero, 1.0, 1.0, far, most * extent(v), table.side[q], opacity)
-        for k in range(8):
-            if (unsure >> k) & 1:
-                settle_ellipsoid(rays, i + k, p, table, q, opacity)
+    far = reach(np.float64(data[q, MOST]), g, v, f, d)
+    return far, closest(f, d, 1, far, U64)
+
+
+@inline
+def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
+    """As `meet`."""
+    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0)
+    x, x1 = two_sum(o.x, -c.x)
+    y, y1 = two_sum(o.y, -c.y)
+    z, z1 = two_sum(o.z, -c.z)
+    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, 3))
+    end, zero = load(ray, T, i), 0 * x
+    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
+    s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far, np.float64(data[q, MOST]) * extent(d),
+                              wide(load(ray, START, i)), wide(end), side)
+    return rounded(s, end), found, unsure
+
+
+@inline
+def into_pairs(exact, q, v, v1):
+    """L (v + v1), as pairs."""
+    x, x1 = row(exact, q, 0, v, v1)
+    y, y1 = row(exact, q, 1, v, v1)
+    z, z1 = row(exact, q, 2, v, v1)
+    return vec3(x, y, z), vec3(x1, y1, z1)
 
 
 @inline
@@ -246,8 +257,17 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
-                        hit_ellipsoid(rays, start + g * 8, first + q, table, q, opacity)
+                    i = start + g * 8
+                    if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q)):
+                        far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
+                        todo = may_meet(near)
+                        if any_lane(todo):
+                            t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
+                            record(rays, i, first + q, t, found, opacity)
+                            late = bits(unsure)
+                            while late:
+                                settle_ellipsoid(rays, i + lowest(late), first + q, table, q, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
