@@ -8,7 +8,7 @@ from rtcore.api import intersect, occluded
 from rtcore.flatten import DTYPES, flatten
 from rtcore.reports.families import batches, families
 from rtcore.reports.meshes import MESHES
-from rtcore.reports.rows import Row, Worst
+from rtcore.reports.rows import Row, Worst, example
 from rtcore.scene import Matrix, Node, Scene, Shape
 from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Quadric, Sphere, Torus, Triangle
 from rtcore.solvers import RENDERER, names, roots
@@ -24,6 +24,7 @@ CONVEX = (Sphere((0.3, -0.2, 0.1), 0.9), Plane((0.1, 0.2, 0.3), (1, -2, 0.5)), T
           Cylinder((-0.3, -0.8, 0.1), (0.4, 0.7, -0.2), 0.6), Cone((0, 0, -0.75), 0.4, (0, 0, 0.75), 0.9))
 CURVED = (Torus(0.7, 0.25), Quadric((4, 4, -2, 0, 0, 0, 0, 0, 0, -1), (-1, -1, -1), (1, 1, 1)),
           Blob((((-0.3, 0, 0), 0.7, 1), ((0.4, 0.1, 0), 0.7, 1)), 0.4))
+MODELS = {type(shape): shape for shape in CONVEX + CURVED}
 FLAT = (Plane, Triangle, Polygon)
 NEAR, STEEP = 0.02, 0.2
 PLACES = (np.eye(4), [[1e-3, 0, 0, 7], [0, 0, -1e-3, -3], [0, 1e-3, 0, 11], [0, 0, 0, 1]],
@@ -35,11 +36,6 @@ def _row(shape: type[Shape], precision: str, family: str, rays: int, wrong: int,
     target = "0 wrong" if solver == RENDERER else ""
     return Row(shape.__name__.lower(), solver, precision, family, rays, wrong, math.nan, math.nan, math.nan, nonfinite, math.nan, target,
                wrong == 0 and nonfinite == 0 if target else None, (worst,) if worst else ())
-
-
-def _example(shape, transform, o, d, precision) -> str:
-    node = f"Node(shape={shape!r}, transform={transform!r})".replace("array(", "np.array(")
-    return f"intersect(Scene(objects=[{node}]), [{o.tolist()}], [{d.tolist()}], precision={precision!r})"
 
 
 # --- any hit against the closest ---
@@ -58,7 +54,7 @@ def any_hit(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
             if differ.any() and worst is None:
                 i = int(differ.argmax())
                 worst = Worst(True, math.inf, "any-hit and closest-hit differ",
-                              _example(batch.shape, batch.transform, batch.origins[i], batch.directions[i], precision))
+                              example(batch.shape, batch.transform, batch.origins[i], batch.directions[i], precision))
     return [_row(shape, precision, "any-hit", rays, wrong, worst, nonfinite)]
 
 
@@ -69,7 +65,7 @@ def closed_meshes(shape: type[Shape], precision: str, n: int, seed: int) -> list
     rng, dtype = np.random.default_rng([seed, 1]), DTYPES[precision]
     rays = wrong = 0
     worst = None
-    for (vertices, faces), room, share in MESHES.values():
+    for name, ((vertices, faces), room, share) in MESHES.items():
         mesh = Mesh(vertices.astype(dtype).astype(float), faces)
         scene = Scene(objects=[mesh])
         for start in range(0, int(n * share), CHUNK):
@@ -86,7 +82,8 @@ def closed_meshes(shape: type[Shape], precision: str, n: int, seed: int) -> list
             rays, wrong = rays + size, wrong + int(lost.sum())
             if lost.any() and worst is None:
                 i = int(lost.argmax())
-                worst = Worst(True, math.inf, "a ray gets out of a closed mesh", _example(mesh, (), eye[i], (target - eye)[i], precision))
+                code = example(f"Mesh(*MESHES[{name!r}][0])", (), eye[i], (target - eye)[i], precision)
+                worst = Worst(True, math.inf, "a ray gets out of a closed mesh", code)
     return [_row(shape, precision, "shared edges", rays, wrong, worst)]
 
 
@@ -161,28 +158,24 @@ def _ways(rng, n: int) -> np.ndarray:
     return way / np.linalg.norm(way, axis=0)
 
 
-def _example_of(shape: type[Shape], of: tuple) -> Shape | None:
-    return next((example for example in of if type(example) is shape), None)
-
-
 def leaving(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
     """Rays that leave a surface meet nothing of it where nothing is; see CONVEX."""
     rng = np.random.default_rng([seed, 3])
-    example = _example_of(shape, CONVEX + CURVED)
+    model = MODELS[shape]
     rays = wrong = 0
     worst = None
     while rays < n:
         for place in PLACES:
             m = np.array(place, float)
             transform = (Matrix(m.tolist()),)
-            geometry = flatten(Scene(objects=[Node(shape=example, transform=transform)]), precision)
+            geometry = flatten(Scene(objects=[Node(shape=model, transform=transform)]), precision)
             o, way, front, cosine, _, _ = _leave(geometry, m, rng, min(n, CHUNK))
             again, _ = _trace(geometry, o, way)
             k = len(front)
             met = again.prim[:k] >= 0
-            if type(example) in FLAT:
+            if shape in FLAT:
                 bad = met
-            elif any(example is convex for convex in CONVEX):
+            elif model in CONVEX:
                 bad = met & front
             else:
                 smallest = np.linalg.svd(m[:3, :3])[1][-1]
@@ -191,22 +184,22 @@ def leaving(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
             if bad.any() and worst is None:
                 i = int(bad.argmax())
                 worst = Worst(True, math.inf, "a ray that leaves meets the surface it left",
-                              _example(example, transform, o[:, i], way[:, i], precision))
+                              example(model, transform, o[:, i], way[:, i], precision))
     return [_row(shape, precision, "leaving", rays, wrong, worst)]
 
 
 def gap(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
     """A plane over the surface, 64 ulp of its coordinates away, is met by every ray that leaves toward it not all but level."""
     rng, per_lid = np.random.default_rng([seed, 4]), 100
-    example = _example_of(shape, CONVEX + CURVED)
+    model = MODELS[shape]
     rays = wrong = 0
     worst = None
-    _, _, _, _, surface, normal = _leave(flatten(Scene(objects=[example]), precision), np.eye(4), rng, max(n // per_lid, 20) * 20)
+    _, _, _, _, surface, normal = _leave(flatten(Scene(objects=[model]), precision), np.eye(4), rng, max(n // per_lid, 20) * 20)
     for k in range(min(n // per_lid, surface.shape[1])):
         point, up, bound = surface[PX:PX + 3, k], normal[:, k], surface[ERR, k]
         high = point + up * 64 * float(np.spacing(DTYPES[precision](max(np.abs(point).max(), 0.5))))
         lid = Plane(tuple(high.tolist()), tuple(up.tolist()))
-        both = flatten(Scene(objects=[example, lid]), precision)
+        both = flatten(Scene(objects=[model, lid]), precision)
         way = _ways(rng, per_lid) + up[:, None]
         way /= np.linalg.norm(way, axis=0)
         way = way[:, (way * up[:, None]).sum(axis=0) > 0.02]
@@ -218,7 +211,7 @@ def gap(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
         if bad.any() and worst is None:
             i = int(bad.argmax())
             ray = f"[{o[:, i].tolist()}], [{way[:, i].tolist()}], precision={precision!r}"
-            worst = Worst(True, math.inf, "a plane 64 ulp above it is not met", f"intersect(Scene(objects=[{example!r}, {lid!r}]), {ray})")
+            worst = Worst(True, math.inf, "a plane 64 ulp above it is not met", f"intersect(Scene(objects=[{model!r}, {lid!r}]), {ray})")
     return [_row(shape, precision, "gap", rays, wrong, worst)]
 
 
@@ -227,6 +220,6 @@ def brute(shape: type[Shape]) -> dict[str, Callable]:
     work = {"any-hit": any_hit}
     if shape in (Mesh, Triangle):
         work["shared edges"] = closed_meshes if shape is Mesh else shared_edge
-    if _example_of(shape, CONVEX + CURVED) is not None:
+    if shape in MODELS:
         work |= {"leaving": leaving, "gap": gap}
     return work

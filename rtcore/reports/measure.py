@@ -11,7 +11,7 @@ from rtcore.flatten import DTYPES, flatten
 from rtcore.reports.condition import condition
 from rtcore.reports.families import Batch, batches
 from rtcore.reports.oracle import crossings, mp
-from rtcore.reports.rows import Point, Row, Worst
+from rtcore.reports.rows import Point, Row, Worst, example
 from rtcore.reports.targets import TARGETS, UNIT
 from rtcore.scene import Shape, invertible
 from rtcore.solvers import METHODS, RENDERER, names, roots
@@ -152,13 +152,10 @@ class _Tally:
 
 def code(batch: Batch, i: int, tally: _Tally) -> str:
     """Python code that does one ray of a batch again."""
-    o, d = batch.origins[i].tolist(), batch.directions[i].tolist()
-    shape = repr(batch.shape).replace("array(", "np.array(")
     if tally.name == RENDERER:
-        return (f"node = Node(shape={shape}, transform={batch.transform!r})\n"
-                f"intersect(Scene(objects=[node]), [{o}], [{d}], precision={tally.precision!r}).t")
+        return example(batch.shape, batch.transform, batch.origins[i], batch.directions[i], tally.precision)
     x = ", ".join(f"[{value!r}]" for value in own_space(batch)[:, i].tolist())
-    return f"solvers.roots({shape}, {tally.name!r}, np.array([{x}], np.{np.dtype(tally.dtype).name}))"
+    return f"solvers.roots({batch.shape!r}, {tally.name!r}, np.array([{x}], np.{np.dtype(tally.dtype).name}))"
 
 
 # --- time ---

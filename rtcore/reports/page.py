@@ -47,7 +47,7 @@ def _examples(judged: list[Row]) -> str:
     worst = [(row, row.worst[0]) for row in judged if row.worst]
     worst.sort(key=lambda pair: pair[1][:2], reverse=True)
     text = ["## The worst rays\n", "Of the solver that pictures are made with; the missed targets first. To try one:\n",
-            "```python\nimport numpy as np\nfrom rtcore import *\nfrom rtcore import solvers\n```\n"]
+            "```python\nfrom rtcore import *\nfrom rtcore.reports.meshes import MESHES\n```\n"]
     for row, case in worst[:MOST_EXAMPLES]:
         text.append(f"**{row.shape}, {row.precision}, {row.family}**: {case.what}\n\n```python\n{case.code}\n```\n")
     return "\n".join(text)

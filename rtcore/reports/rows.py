@@ -2,6 +2,9 @@
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from rtcore.scene import Shape
+from rtcore.shapes import Mesh
+
 COLUMNS = ("shape", "solver", "precision", "family", "rays", "wrong", "p50", "p99", "max_ulp", "nonfinite", "ns_per_ray", "target", "met")
 POINT_COLUMNS = ("shape", "solver", "precision", "family", "distance", "scale", "ulp")
 
@@ -14,6 +17,14 @@ class Worst(NamedTuple):
     ulp: float
     what: str
     code: str
+
+
+def example(shape: Shape | str, transform: tuple, origin, direction, precision: str) -> str:
+    """Python code that sends one ray at a placed shape, a record or the code for one."""
+    if isinstance(shape, Mesh):
+        shape = f"Mesh({shape.vertices.tolist()}, {shape.faces.tolist()})"
+    return (f"node = Node(shape={shape}, transform={transform!r})\n"
+            f"intersect(Scene(objects=[node]), [{list(map(float, origin))}], [{list(map(float, direction))}], precision={precision!r}).t")
 
 
 class Point(NamedTuple):

@@ -1,0 +1,102 @@
+"""The named solvers: right on easy rays, wrong in the ways they are known for on hard ones, and never a part of the renderer."""
+import ast
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rtcore
+from rtcore import Plane, Polygon, Quadric, Sphere, Torus, Triangle, solvers
+from rtcore.reports.oracle import crossings, mp
+
+PARABOLOID = Quadric((1, 1, 0, 0, 0, 0, 0, 0, -1, 0))
+SHAPES = (Sphere((0.1, 0.2, 0.3), 1.2), Plane((0.1, 0.2, 0.3), (1, 2, 3)), Triangle((-2, -2, 0.1), (3, -1, 0.5), (0.2, 3, 0)),
+          Quadric((1, 2, 0.5, 0.1, 0.2, 0.3, 0.1, 0.2, 0.3, -2)), Quadric(PARABOLOID.coefficients, (-1, -1, -1), (1, 1, 1)),
+          Torus(1, 0.25), Torus(1, 0.9), Torus(0.5, 1))
+ALL = [(shape, name) for shape in SHAPES for name in solvers.names(type(shape))[1:]]
+
+
+def one(shape, name, origin, direction, dtype=np.float64):
+    """A solver's roots of one ray, ascending."""
+    found, count = solvers.roots(shape, name, np.array([*origin, *direction], dtype)[:, None])
+    return sorted(found[0, :count[0]].tolist())
+
+
+def test_names():
+    assert solvers.names(Sphere) == ("renderer", "textbook", "stable", "geometric")
+    assert solvers.names(Plane) == ("renderer", "point-normal", "height-and-secant")
+    assert solvers.names(Triangle) == ("renderer", "cramer", "moeller-trumbore")
+    assert solvers.names(Polygon) == ("renderer",)
+    assert {"textbook", "stable", "kahan"} < set(solvers.names(Quadric))
+    assert {"ferrari", "ferrari-near", "companion", "sturm", "orellana"} < set(solvers.names(Torus))
+    assert all(solver.solve.__doc__ for methods in solvers.METHODS.values() for solver in methods.values())
+
+
+@pytest.mark.parametrize(("shape", "name"), ALL, ids=lambda x: x if isinstance(x, str) else "")
+def test_every_root_of_easy_rays(shape, name):
+    rng = np.random.default_rng(3)
+    o, d = rng.uniform(-3, 3, (60, 3)), rng.uniform(-1, 1, (60, 3))
+    d -= o
+    truth = [[c.t for c in crossings(shape, np.eye(4), *ray)] for ray in zip(o, d)]
+    assert sum(map(len, truth)) > 30
+    for dtype, off in ((np.float64, 1e-9), (np.float32, 2e-2)):
+        found, count = solvers.roots(shape, name, np.concatenate([o.T, d.T]).astype(dtype))
+        assert found.dtype == dtype
+        for true, row, n in zip(truth, found, count):
+            assert len(true) == n
+            for a, b in zip(true, sorted(row[:n].tolist())):
+                assert abs(b - a) <= off
+
+
+def test_arithmetic_is_of_the_precision():
+    """Bit for bit what numpy makes of the formula in float32."""
+    rng = np.random.default_rng(4)
+    o, d = rng.uniform(-1, 1, (2, 3, 200)).astype(np.float32)
+    a, b, c = (d * d).sum(0), 2 * (o * d).sum(0), (o * o).sum(0) - np.float32(4)
+    expected = (-b + np.sqrt(b * b - 4 * (a * c))) / (2 * a)
+    assert expected.dtype == np.float32
+    found, count = solvers.roots(Sphere((0, 0, 0), 2), "textbook", np.concatenate([o, d]))
+    assert (count == 2).all() and (found[:, 1] == expected).all()
+
+
+@pytest.mark.parametrize(("name", "least", "most"), [("textbook", 5.7e7, 5.9e7), ("stable", 5.7e7, 5.9e7), ("geometric", 0, 4)])
+def test_the_far_sphere(name, least, most):
+    """o = (0, 1/2, -1e8): the discriminant cancels, whichever way the roots are taken."""
+    true = 1e8 - mp.sqrt(mp.mpf("0.75"))
+    error = abs(one(Sphere((0, 0, 0), 1), name, (0, 0.5, -1e8), (0, 0, 1))[0] - true) / np.spacing(float(true))
+    assert least <= error <= most
+
+
+def test_the_far_sphere_in_float32():
+    true = 4100 - np.sqrt(0.75)
+    error = abs(one(Sphere((0, 0, 0), 1), "stable", (0, 0.5, -4100), (0, 0, 1), np.float32)[0] - true) / np.spacing(np.float32(true))
+    assert 1700 < error < 1800
+
+
+def test_quadric_without_a_square():
+    for name in ("textbook", "stable"):
+        assert not np.isfinite(one(PARABOLOID, name, (0.5, 0, 5), (0, 0, -1))).all()
+    assert one(PARABOLOID, "kahan", (0.5, 0, 5), (0, 0, -1)) == [4.75]
+
+
+def test_quadric_whose_discriminant_vanishes():
+    near = Quadric((94906265.625, 0, 0, 0, 0, 0, -189812534, 0, 0, 94906268.375))
+    assert one(near, "kahan", (0, 0, 0), (1, 0, 0)) == pytest.approx([1, 1.00000002897595835], abs=1e-15)
+    assert max(abs(t - 1) for t in one(near, "textbook", (0, 0, 0), (1, 0, 0))) < 2e-8     # one root twice, halfway between
+
+
+def test_torus_from_far_away():
+    """The raw coefficients lose the root; those about the closest approach don't."""
+    ring, origin, true = Torus(1, 0.25), (-1e4, 0.1, 0.05), 9998.7590737538
+    raw = one(ring, "ferrari", origin, (1, 0, 0))
+    assert not raw or abs(raw[0] - true) > 1e-4
+    for name in ("companion", "sturm", "orellana"):
+        assert one(ring, name, origin, (1, 0, 0))[0] == pytest.approx(true, abs=1e-9)
+
+
+def test_the_renderer_imports_no_solver():
+    root = Path(rtcore.__file__).parent
+    for path in root.rglob("*.py"):
+        if path.parent.name not in ("solvers", "reports"):
+            tree = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+            assert not [node for node in tree if isinstance(node, (ast.Import, ast.ImportFrom)) and "solvers" in ast.unparse(node)], path
