@@ -36,40 +36,50 @@ ON_DARK = ("#56b4e9", "#e8833a", "#2cc79a", "#e08fc0", "#e6c229", "#d0d0d0", "#8
 
 
 class Style(NamedTuple):
-    """How a figure looks: its paper and inks, the size of its letters in pixels."""
+    """How a figure looks: its paper and inks, the size of its letters in pixels, and a line of them as a share of a plot's height."""
 
     paper: str
     ink: str
     faint: str
     colors: tuple[str, ...]
     letters: int
+    line: float
 
     def color(self, number: int) -> str:
         """The colour of the curve of that number."""
         return self.colors[number % len(self.colors)]
 
 
-PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21)
+PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21, 0.05)
 
 
 def on_screen(theme: Theme) -> Style:
     """The style of a figure within the window."""
-    return Style(theme.panel, theme.text, theme.faint, ON_DARK if theme.name == "dark" else ON_LIGHT, 12)
+    return Style(theme.panel, theme.text, theme.muted, ON_DARK if theme.name == "dark" else ON_LIGHT, 12, 0.11)
 
 
 class Decades(pg.AxisItem):
-    """An axis of logarithms to the base 10: labels at powers of ten, as many as fit, and small ticks between them."""
+    """An axis of logarithms to the base 10: labels at powers of ten, as many as fit, with small ticks between them; where less than two
+    powers are in sight, at 1, 2 and 5 of each."""
 
     def tickValues(self, low: float, high: float, size: float):
+        decades = range(math.floor(low), math.ceil(high) + 1)
+        ticks = [n + math.log10(k) for n in decades for k in range(1, 10)]
         step = max(1, math.ceil((high - low) * 55 / max(size, 1)))
-        whole = [float(n) for n in range(math.ceil(low), math.floor(high) + 1)]
-        labelled = [n for n in whole if n % step == 0]
-        between = [n for n in whole if n % step] if step > 1 else [
-            n + math.log10(k) for n in range(math.floor(low), math.ceil(high)) for k in range(2, 10) if low <= n + math.log10(k) <= high]
-        return [(step, labelled), (0.1, between)]
+        if high - low < 2:
+            labelled = [n + math.log10(k) for n in decades for k in (1, 2, 5)]
+        else:
+            labelled = [float(n) for n in decades if n % step == 0]
+        between = ticks if step == 1 else [float(n) for n in decades]
+        labelled, between = ([x for x in values if low <= x <= high] for values in (labelled, between))
+        return [(step, labelled), (0.1, [x for x in between if x not in labelled])]
 
     def tickStrings(self, values, scale, spacing):
-        return ["10" + str(round(value)).translate(RAISED) if spacing >= 1 else "" for value in values]
+        if spacing < 1:
+            return [""] * len(values)
+        if all(value == round(value) for value in values) and len(values) > 2:
+            return ["10" + str(round(value)).translate(RAISED) for value in values]
+        return [f"{10 ** value:,.6g}" for value in values]
 
 
 class Figure(pg.GraphicsLayoutWidget):
@@ -134,7 +144,7 @@ def error_against(report: Report, shape: str, what: str, style: Style = PRINTED)
         width = max(right - left, 1.0)
         plot.setXRange(left - 0.04 * width, right + 0.36 * width)
         plot.setYRange(FLOOR - 0.3, max(top, 1.0) + 0.5)
-        heights = apart([c[3][-1] for c in curves], (max(top, 1.0) + 0.8 - FLOOR) * 0.055)
+        heights = apart([c[3][-1] for c in curves], (max(top, 1.0) + 0.8 - FLOOR) * style.line)
         for (number, solver, middles, medians, maxima), height in zip(curves, heights):
             color = style.color(number)
             plot.plot(middles, medians, pen=pg.mkPen(color, width=style.letters / 6), antialias=True)
@@ -147,7 +157,7 @@ def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure
     """Error against time: a mark per solver and precision, small ones for each family of rays."""
     figure = Figure(f"{shape.capitalize()}: work and precision", "Large marks: the worst family of rays; small: each family. Squares: "
                     "float32; circles: float64. Open, at the upper edge: hits that were missed or made up.", style)
-    plot = figure.panel(0, "", "time / ns per ray", "99th percentile of the error of t / ulp")
+    plot = figure.panel(0, "", "time / ns per ray", "error of t, 99th percentile / ulp")
     marks, failed = [], []
     for number, solver in enumerate(report.solvers(shape)):
         for precision in PRECISIONS:
@@ -163,8 +173,9 @@ def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure
     low, high, top = min(times), max(times), max([*heights, 1.0])
     width = max(high - low, 0.5)
     plot.setXRange(low - 0.08 * width, high + 0.25 * width)
-    plot.setYRange(FLOOR - 0.3, top + (0.14 if failed else 0.06) * (top - FLOOR) + 0.3)
-    edge = top + 0.09 * (top - FLOOR) + 0.3
+    line = (top - FLOOR) * 1.3 * style.line     # the height of one at the upper edge, a line for each solver that fails
+    failing = list(dict.fromkeys(number for number, *_ in failed))
+    plot.setYRange(FLOOR - 0.3, top + 0.3 + line * (len(failing) + 0.5))
     small, large = style.letters * 0.35, style.letters * 0.8
     ends = {}
     for number, solver, precision, time, families in marks:
@@ -175,16 +186,18 @@ def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure
                   symbolPen=None)
         if drawn:
             ends.setdefault((number, solver), []).append((time, max(h for _, h in drawn), MARKS[precision]))
-    labels = apart([points[-1][1] for points in ends.values()], (edge - FLOOR) * 0.05)
+    labels = apart([points[-1][1] for points in ends.values()], 0.8 * line)
     for ((number, solver), points), height in zip(ends.items(), labels):
         color = style.color(number)
         plot.plot([p[0] for p in points], [p[1] for p in points], pen=pg.mkPen(color, width=style.letters / 8),
-                  symbol=[p[2] for p in points], symbolSize=large, symbolBrush=color, symbolPen=pg.mkPen(style.paper, width=1))
+                  symbol=[p[2] for p in points], symbolSize=large, symbolBrush=color, symbolPen=pg.mkPen(style.paper, width=1),
+                  antialias=True)
         write(plot, solver, points[-1][0] + 0.02 * width, height, color, style)
     for number, precision, time, words in failed:
+        edge = top + 0.3 + line * (failing.index(number) + 0.6)
         plot.plot([time], [edge], pen=None, symbol=MARKS[precision], symbolSize=large, symbolBrush=None,
                   symbolPen=pg.mkPen(style.color(number), width=style.letters / 8))
-        write(plot, words, time, edge, style.color(number), style, above=True)
+        write(plot, words, time + 0.012 * width, edge, style.color(number), style, small=True)
     return figure
 
 
@@ -201,11 +214,11 @@ def apart(heights: list[float], least: float) -> list[float]:
     return result
 
 
-def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, above: bool = False):
-    """Write beside a point, or above it."""
-    label = pg.TextItem(text, color=color, anchor=(0.5, 1.35) if above else (0, 0.5))
+def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, small: bool = False):
+    """Write to the right of a point."""
+    label = pg.TextItem(text, color=color, anchor=(0, 0.5))
     font = QFont()
-    font.setPixelSize(round(style.letters * (0.75 if above else 0.95)))
+    font.setPixelSize(round(style.letters * (0.75 if small else 0.95)))
     font.setWeight(QFont.Weight.DemiBold)
     label.setFont(font)
     label.setPos(x, y)

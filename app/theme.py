@@ -96,6 +96,12 @@ QTreeView::branch { background: transparent; }
 QTreeView::branch:has-children:closed { image: url(%(icons)s/chevron-right.svg); }
 QTreeView::branch:has-children:open { image: url(%(icons)s/chevron-down.svg); }
 
+QTableView { background: %(panel)s; border: none; outline: none; selection-background-color: %(soft)s; selection-color: %(text)s; }
+QTableView::item { padding: 0 8px; }
+QHeaderView { background: %(panel)s; }
+QHeaderView::section { background: %(panel)s; color: %(muted)s; border: none; border-bottom: 1px solid %(line)s; padding: 4px 8px;
+    font-weight: 600; }
+
 QLineEdit, QComboBox { background: %(field)s; border: 1px solid %(line)s; border-radius: 4px; padding: 3px 5px; color: %(text)s;
     selection-background-color: %(accent)s; selection-color: %(on_accent)s; min-height: 17px; }
 QLineEdit:hover, QComboBox:hover { border-color: %(faint)s; }

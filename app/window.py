@@ -20,7 +20,8 @@ from app.settings import Preferences
 from app.status import Status
 from app.viewport import Viewport
 
-AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea}
+AREAS = {"left": Qt.DockWidgetArea.LeftDockWidgetArea, "right": Qt.DockWidgetArea.RightDockWidgetArea,
+         "bottom": Qt.DockWidgetArea.BottomDockWidgetArea}
 SCENES = "Scenes and meshes (*.yaml *.yml *.json *.nff *.obj *.ply *.stl *.glb *.gltf *.off);;All files (*)"
 UPPER = 300     # pixels of height for the panels above them
 TALL = 900      # pixels of a screen from which on the properties stand below the other panels and not behind them
@@ -90,7 +91,8 @@ class Window(QMainWindow):
                 dock.setTitleBarWidget(None)
 
     def arrange(self):
-        """The built-in arrangement: the tree left; right the rest in tabs, on a tall screen the properties below them."""
+        """The built-in arrangement: the tree left; right the rest in tabs, on a tall screen the properties below them; what belongs to the
+        bottom is hidden until it is asked for."""
         height = self.screen().availableGeometry().height()
         right: list[QDockWidget] = []
         for panel in PANELS:
@@ -98,7 +100,7 @@ class Window(QMainWindow):
             self.removeDockWidget(dock)
             self.addDockWidget(AREAS[panel.area], dock)
             dock.setFloating(False)
-            dock.show()
+            dock.setVisible(panel.area != "bottom")
             if panel.area == "right":
                 right.append(dock)
         last = self.docks["Properties"]
@@ -298,7 +300,7 @@ class Window(QMainWindow):
     def show_panels(self, on: bool):
         """Show the docks that were there, or only the picture."""
         if on:
-            for dock in self._hidden or list(self.docks.values()):
+            for dock in self._hidden or [self.docks[panel.title] for panel in PANELS if panel.area != "bottom"]:
                 dock.show()
         else:
             self._hidden = [dock for dock in self.docks.values() if not dock.isHidden()]
@@ -351,6 +353,9 @@ class Window(QMainWindow):
         if not self.actions_by_id["panels"].isChecked():
             self.show_panels(True)
         self.preferences.layout = self.saveGeometry(), self.saveState()
+        for panel in self.panels.values():
+            if hasattr(panel, "close_down"):
+                panel.close_down()
         self.session.close()
         event.accept()
 

@@ -3,6 +3,7 @@ from app.panels.camera import CameraPanel
 from app.panels.fog import FogPanel
 from app.panels.properties import PropertiesPanel
 from app.panels.render import RenderPanel
+from app.panels.stability import StabilityPanel
 from app.panels.tree import TreePanel
 
-PANELS = (TreePanel, CameraPanel, FogPanel, RenderPanel, PropertiesPanel)
+PANELS = (TreePanel, CameraPanel, FogPanel, RenderPanel, PropertiesPanel, StabilityPanel)

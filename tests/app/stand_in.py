@@ -25,9 +25,9 @@ def write(folder: Path, shapes: list[str], n: int = 60):
                     distance, scale = 10 ** dice.uniform(0, 7, n), 10 ** dice.uniform(-6, 6, n)
                     ulp = np.abs(dice.normal(size=n)) * 0.4 * distance ** growth
                     points += [(shape, solver, precision, family, *point) for point in zip(distance, scale, ulp)]
-                    own = solver == "renderer"
+                    target, met = ("2 ulp, 0 wrong", bool(ulp.max() < 1.5)) if solver == "renderer" else ("", "")
                     rows.append((shape, solver, precision, family, n, round(wrong * n), *np.percentile(ulp, (50, 99, 100)), 0,
-                                 time_ * factor * dice.uniform(0.9, 1.3), "2 ulp, 0 wrong" if own else "", bool(ulp.max() < 1.5) if own else ""))
+                                 time_ * factor * dice.uniform(0.9, 1.3), target, met))
     for name, columns, lines in (("stability.csv", ROWS, rows), ("stability.points.csv", POINTS, points)):
         with open(folder / name, "w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows([columns, *lines])
