@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import (Blob, Box, Cone, Cylinder, FieldError, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Rotate, Scale, Scene, Sphere,
-                    Torus, Translate, Triangle)
+from rtcore import (Blob, Box, Cone, Cylinder, FieldError, Implicit, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Rotate, Scale, Scene,
+                    Shear, Sphere, Torus, Translate, Triangle)
 from rtcore.scene import Shape
 
 from naive import crossings as twin
@@ -222,6 +222,21 @@ def test_one_visible_side(shape, o, d, front, back):
         for mirror in ((1, 1, 1), (1, 1, -1), (-1, -1, -1)):
             node = Node(shape=one, transform=(Scale(mirror),))
             assert rtcore.crossings(node, np.multiply(o, mirror), np.multiply(d, mirror)).tolist() == expected
+
+
+def test_a_formula():
+    """Its roots come from intervals; how often they count and which are seen is as for the other shapes."""
+    ball = Implicit("x^2 + y^2 + z^2 - 1", (-2, -2, -2), (2, 2, 2))
+    place = (Shear(xy=0.5), Scale((1, 2, 4)), Translate((0, 0, 1)))
+    for o, d in (((0.1, 0.2, -1e6), UP), ((3, 4, 5), (-1e-20, -1.5e-20, -2e-20)), ((0.5, 0, 0), (0, 0, 1e30))):
+        for precision in ("f64", "f32"):
+            exact, found = (rtcore.crossings(Node(shape=shape, transform=place), o, d, precision) for shape in (BALL, ball))
+            assert len(found) == len(exact) == 2 and found.dtype == exact.dtype
+            assert found == pytest.approx(exact, rel=8 * float(np.finfo(exact.dtype).eps))
+    assert rtcore.crossings(ball, (0, 1, -5), (0, 0, 2)).tolist() == [2.5, 2.5]
+    for sides, t in (("front", 4), ("back", 6)):
+        one = msgspec.structs.replace(ball, sides=sides)
+        assert rtcore.crossings(one, (0, 0, -5), UP).tolist() == [t] and not len(rtcore.crossings(one, (0, 1, -5), UP))
 
 
 # --- scenes, numbers, errors ---

@@ -32,19 +32,6 @@ def lines_for(shape, name: str) -> int:
     return every // (2 * OF_CLASS.get(name, 1))
 
 
-def rounded(value, dtype):
-    """A record with all its numbers rounded, as the contract says for float32."""
-    if isinstance(value, float):
-        return float(dtype(value))
-    if isinstance(value, tuple):
-        return tuple(rounded(x, dtype) for x in value)
-    if isinstance(value, np.ndarray) and value.dtype.kind == "f":
-        return value.astype(dtype).astype(np.float64)
-    if isinstance(value, msgspec.Struct):
-        return msgspec.structs.replace(value, **{f: rounded(getattr(value, f), dtype) for f in value.__struct_fields__})
-    return value
-
-
 def stretched(rng) -> tuple:
     """Scales along the axes from 1e-6 to 1e6, sheared, turned and moved, some mirrored, half of them along axes at an angle."""
     scale = Scale(tuple(10 ** rng.uniform(-6, 6, 3) * rng.choice([-1, 1], 3)))
@@ -67,7 +54,7 @@ def lines(rng, matrix, n: int, dtype):
 def test_crossings_are_the_twins(name, precision):
     rng = np.random.default_rng([len(name), ord(name[-1]), len(precision)])
     shape, dtype, total, met = SHAPES[name], DTYPE[precision], lines_for(SHAPES[name], name), 0
-    exact = rounded(shape, dtype)
+    exact = shape.rounded(dtype)
     for first in range(0, total, 20):
         node = Node(shape=shape, transform=stretched(rng))
         matrix = node.matrix()

@@ -3,19 +3,19 @@ import functools
 
 import numpy as np
 
-from rtcore.algebra import curved, flat
+from rtcore.algebra import certified, curved, flat
 from rtcore.algebra.curved import Crossing, Find
 from rtcore.algebra.lines import Place, line_of
 from rtcore.algebra.roots import nearest
 from rtcore.fields import FieldError
 from rtcore.flatten import DTYPES, place as where
 from rtcore.scene import Node, Scene, Shape
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 FINDERS = {
     Sphere: curved.sphere, Plane: flat.plane, Triangle: flat.triangle, Mesh: flat.mesh, Polygon: flat.polygon, Box: flat.box,
     Cylinder: curved.cylinder, Cone: curved.cone, Quadric: curved.quadric, Torus: curved.torus, Polyhedron: flat.polyhedron,
-    Blob: curved.blob,
+    Blob: curved.blob, Implicit: certified.implicit,
 }
 DIGITS = {"f64": (53, -1074), "f32": (24, -149)}      # of the precision: binary digits, power of the smallest number
 
@@ -26,9 +26,11 @@ def crossings(shape: Shape | Node | Scene, origin, direction, precision: str = "
 
     origin, direction: three numbers each; in "f32" they and the shape's own numbers are first rounded to float32, transforms are not.
     From there all is done in whole numbers (`rtcore.algebra`): how many there are is certain, and each is the float nearest to the truth;
-    what is beyond all floats is ± inf. A root counts as often as its multiplicity: a tangent twice. A tangent has no facing, so a
-    shape with one visible side does not show it. A line that runs in a surface does not cross it there. Of several faces of one shape
-    met at the very same t (an edge, a corner, a rim), those that face the same way count once.
+    what is beyond all floats is ± inf. Only a formula's roots come from intervals and are off by a few roundings (`Implicit`).
+
+    A root counts as often as its multiplicity: a tangent twice. A tangent has no facing, so a shape with one visible side does not show
+    it. A line that runs in a surface does not cross it there. Of several faces of one shape met at the very same t (an edge, a corner,
+    a rim), those that face the same way count once.
 
     Raises FieldError for arrays of another shape, numbers that are not finite, a direction of 0.
     """
@@ -91,7 +93,7 @@ def _finders(same: _Same, dtype: type) -> list[tuple[Find, str]]:
 def _finder(shape: Shape, matrix: np.ndarray, dtype: type) -> Find:
     if type(shape) not in FINDERS:
         raise FieldError("one of " + ", ".join(sorted(known.__name__ for known in FINDERS)), type(shape).__name__)
-    return FINDERS[type(shape)](shape, Place(matrix, dtype))
+    return FINDERS[type(shape)](shape if dtype is np.float64 else shape.rounded(dtype), Place(matrix))
 
 
 def _seen(found: list[Crossing], sides: str) -> list[Crossing]:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from rtcore.algebra.lines import Line, Place, dot, minus, times as stretched
+from rtcore.algebra.lines import Line, Place, dot, dyadic, minus, times as stretched
 from rtcore.algebra.polynomials import Poly, plus, rootless, scaled, sign, times
 from rtcore.algebra.roots import Rational, Root, compare, real_roots
 
@@ -47,7 +47,7 @@ def square(f, g) -> Poly:
 
 
 def sphere(shape, place: Place) -> Find:
-    (*center, radius), shift = place.whole(*shape.center, shape.radius)
+    (*center, radius), shift = dyadic(*shape.center, shape.radius)
 
     def find(line: Line) -> list[Crossing]:
         line = place.local(line)
@@ -56,8 +56,8 @@ def sphere(shape, place: Place) -> Find:
 
 
 def quadric(shape, place: Place) -> Find:
-    coefficients, _ = place.whole(*shape.coefficients)
-    box = None if shape.low is None else place.whole(*shape.low, *shape.high)
+    coefficients, _ = dyadic(*shape.coefficients)
+    box = None if shape.low is None else dyadic(*shape.low, *shape.high)
 
     def find(line: Line) -> list[Crossing]:
         origin, direction, scale = line = place.local(line)
@@ -86,7 +86,7 @@ def cone(shape, place: Place) -> Find:
 
 def frustum(shape, radii, place: Place) -> Find:
     """With q = p - base, A = apex - base and h = q · A its wall is A·A (A·A |q|² - h²) = (r₀ A·A + (r₁ - r₀) h)²."""
-    numbers, shift = place.whole(*shape.base, *shape.apex, *radii)
+    numbers, shift = dyadic(*shape.base, *shape.apex, *radii)
     base, axis, (r0, r1) = numbers[:3], minus(numbers[3:6], numbers[:3]), numbers[6:]
     length2 = dot(axis, axis)
 
@@ -109,7 +109,7 @@ def frustum(shape, radii, place: Place) -> Find:
 
 def torus(shape, place: Place) -> Find:
     """(|p|² + R² - r²)² = 4 R² (x² + y²)."""
-    (big, small), shift = place.whole(shape.major_radius, shape.minor_radius)
+    (big, small), shift = dyadic(shape.major_radius, shape.minor_radius)
 
     def find(line: Line) -> list[Crossing]:
         line = place.local(line)
@@ -125,8 +125,8 @@ def torus(shape, place: Place) -> Find:
 
 def blob(shape, place: Place) -> Find:
     """The ends of the elements' spheres cut the line into stretches, on each of which the field is one quartic."""
-    spheres, shift = place.whole(*(x for center, radius, _ in shape.elements for x in (*center, radius)))
-    (threshold, *strengths), _ = place.whole(shape.threshold, *(strength for _, _, strength in shape.elements))
+    spheres, shift = dyadic(*(x for center, radius, _ in shape.elements for x in (*center, radius)))
+    (threshold, *strengths), _ = dyadic(shape.threshold, *(strength for _, _, strength in shape.elements))
     strong = max(1, *strengths)
     level = threshold / strong * (1 - 1e-9)
     elements = [(spheres[4 * k:4 * k + 3], spheres[4 * k + 3], strength) for k, strength in enumerate(strengths) if strength]

@@ -13,8 +13,8 @@ NOISE = 2.0 ** -42      # more than the error of `possible`'s volumes: 6 product
 
 
 def plane(shape, place: Place) -> Find:
-    point, shift = place.whole(*shape.point)
-    normal, _ = place.whole(*shape.normal)
+    point, shift = dyadic(*shape.point)
+    normal, _ = dyadic(*shape.normal)
 
     def find(line: Line) -> list[Crossing]:
         f, g = seen_from(place.local(line), point, shift)
@@ -36,24 +36,21 @@ def corners(line: Line, points, shift: int) -> list[Crossing]:
 
 
 def triangle(shape, place: Place) -> Find:
-    numbers, shift = place.whole(*shape.a, *shape.b, *shape.c)
+    numbers, shift = dyadic(*shape.a, *shape.b, *shape.c)
     points = numbers[:3], numbers[3:6], numbers[6:]
     return lambda line: corners(place.local(line), points, shift)
 
 
 def mesh(shape, place: Place) -> Find:
     """Those triangles that floats can't exclude, exactly."""
-    with np.errstate(over="ignore"):
-        vertices = shape.vertices.astype(place.dtype).astype(np.float64)
-    place.whole(*vertices[~np.isfinite(vertices)][:1])
     if not len(shape.faces):
         return lambda line: []
-    faces = vertices[shape.faces]
+    faces = shape.vertices[shape.faces]
     low, high = faces.min((0, 1)), faces.max((0, 1))
     middle = low / 2 + high / 2
     power = int(np.frexp(np.abs(high / 2 - low / 2).max())[1])
     around = np.ldexp(faces - middle, -power)       # within -1 .. 1, and some roundings
-    center, shift = dyadic(middle)
+    center, shift = dyadic(*middle)
 
     def find(line: Line) -> list[Crossing]:
         line = place.local(line)
@@ -67,7 +64,7 @@ def mesh(shape, place: Place) -> Find:
         way, most = np.array([x / max(map(abs, g)) for x in g]), np.array([x / size for x in foot])
         found = []
         for face in np.flatnonzero(possible(around - most, way)):
-            numbers, own = dyadic(faces[face].ravel())
+            numbers, own = dyadic(*faces[face].ravel())
             found += corners(line, (numbers[:3], numbers[3:6], numbers[6:]), own)
         return found
     return find
@@ -84,7 +81,7 @@ def possible(faces: np.ndarray, way: np.ndarray) -> np.ndarray:
 def polygon(shape, place: Place) -> Find:
     """The plane through the middle of the corners with Newell's normal; inside, by the rule of `rtcore.shapes.polygon`: an odd number of
     edges, each with its lower end and without its upper one, in the two axes of the world that the normal points at least."""
-    numbers, low = place.whole(*(x for point in shape.vertices for x in point))
+    numbers, low = dyadic(*(x for point in shape.vertices for x in point))
     count, shift = len(shape.vertices), low + place.shift
     points = [tuple(dot(row, numbers[k:k + 3]) + (c << low) for row, c in zip(place.rows, place.offset)) for k in range(0, 3 * count, 3)]
     edges = [minus(p, points[0]) for p in points]
@@ -130,7 +127,7 @@ def solid(heights) -> list[Crossing]:
 
 
 def box(shape, place: Place) -> Find:
-    ends, shift = place.whole(*shape.low, *shape.high)
+    ends, shift = dyadic(*shape.low, *shape.high)
 
     def find(line: Line) -> list[Crossing]:
         line = place.local(line)
@@ -140,8 +137,8 @@ def box(shape, place: Place) -> Find:
 
 
 def polyhedron(shape, place: Place) -> Find:
-    points, shift = place.whole(*(x for point, _ in shape.planes for x in point))
-    normals, _ = place.whole(*(x for _, normal in shape.planes for x in normal))
+    points, shift = dyadic(*(x for point, _ in shape.planes for x in point))
+    normals, _ = dyadic(*(x for _, normal in shape.planes for x in normal))
     planes = [(points[k:k + 3], normals[k:k + 3]) for k in range(0, len(points), 3)]
 
     def find(line: Line) -> list[Crossing]:

@@ -24,7 +24,7 @@ def times(s: int, a) -> Whole3:
     return s * a[0], s * a[1], s * a[2]
 
 
-def dyadic(numbers) -> tuple[list[int], int]:
+def dyadic(*numbers: float) -> tuple[list[int], int]:
     """Whole numbers n and a shift of at least 0 such that the floats are n / 2^shift."""
     ratios = [float(x).as_integer_ratio() for x in numbers]
     shift = max((below.bit_length() for _, below in ratios), default=1) - 1
@@ -41,18 +41,18 @@ class Line(NamedTuple):
 
 def line_of(origin, direction) -> tuple[Line, int]:
     """The line o + t d of floats, and the power with t = u · 2^power: so one of the two need not be stretched to fit the other."""
-    o, low = dyadic(origin)
-    d, high = dyadic(direction)
+    o, low = dyadic(*origin)
+    d, high = dyadic(*direction)
     return Line(tuple(o), tuple(d), 1 << low), high - low
 
 
 class Place:
-    """Where a shape stands: its 4 x 4 matrix, exactly, and the type that its own numbers are rounded to."""
+    """Where a shape stands: its 4 x 4 matrix, exactly."""
 
-    def __init__(self, matrix: np.ndarray, dtype: type):
-        self.dtype = dtype
+    def __init__(self, matrix: np.ndarray):
+        self.matrix = matrix
         try:
-            numbers, self.shift = dyadic(matrix[:3].ravel())
+            numbers, self.shift = dyadic(*matrix[:3].ravel())
         except (ValueError, OverflowError):
             raise FieldError("a matrix of finite numbers", matrix.tolist()) from None
         rows = [tuple(numbers[k:k + 3]) for k in (0, 4, 8)]
@@ -63,14 +63,6 @@ class Place:
             raise FieldError("transforms that together are invertible", matrix.tolist())
         self._adjugate = tuple(zip(*cofactors)) if self.determinant > 0 else tuple(zip(*(times(-1, c) for c in cofactors)))
         self._same = bool((matrix == np.eye(4)).all())
-
-    def whole(self, *numbers) -> tuple[list[int], int]:
-        """A shape's own numbers, rounded to the type: whole numbers and the shift they share."""
-        with np.errstate(over="ignore"):
-            rounded = np.array(numbers).astype(self.dtype)
-        if not np.isfinite(rounded).all():
-            raise FieldError(f"a shape whose numbers fit {np.dtype(self.dtype).name}", max(numbers, key=abs))
-        return dyadic(rounded.tolist())
 
     def local(self, line: Line) -> Line:
         """A line of the world in the shape's own space."""

@@ -228,22 +228,22 @@ def _bounds(data, extra):
 
 
 @kernel
-def _every_root(rays, table, roots):
+def _every_root(rays, table, side, roots):
     """Every root along ray 0 within the box of implicit 0 into roots (m, 2), as t and how often; returns how many."""
     local, code = np.empty((RAY_ROWS, 8)), np.empty((MOST_STEPS, 4))
     bring(rays, 0, table.exact, 0, local, 0)
-    return march(take_code(code, table.exact, 0), new_search(), local, 1, 0, False, np.empty(8), np.empty(8, np.uint8), roots)
+    return march(take_code(code, table.exact, 0), new_search(), local, 1, side, False, np.empty(8), np.empty(8, np.uint8), roots)
 
 
-def line_roots(shape: Implicit, matrix: np.ndarray, origin, direction) -> list[float]:
+def line_roots(shape: Implicit, matrix: np.ndarray, origin, direction, side: int = 0) -> list[float]:
     """Every t at which the line origin + t·direction crosses the shape under a 4 x 4 matrix, ascending, negative ones too; where it only
-    touches, twice. Each is off by at most 8 x condition x 2⁻⁵³; visible sides are not looked at."""
+    touches, twice. Each is off by at most 8 x condition x 2⁻⁵³. side: only what faces this way, as in Table.side."""
     packed, rays = shape.pack(matrix), new_rays(1, np.float64)
     rays.ray[:], rays.ray[START], rays.ray[T] = 1, -np.inf, np.inf
     rays.ray[OX:OX + 3, 0], rays.ray[DX:DX + 3, 0] = origin, direction
     roots = np.empty((MOST_ROOTS, 2))
     table = Table(packed.data, np.zeros((0, 9)), np.zeros(1, np.int8), packed.exact)
-    count = _every_root(rays, table, roots)
+    count = _every_root(rays, table, side, roots)
     return [float(t) for t, often in roots[:count] for _ in range(int(often))]
 
 
