@@ -41,9 +41,23 @@ def test_a_layout_that_is_no_layout_does_not_matter(qtbot, session, preferences)
     preferences.layout = QByteArray(b"not a geometry"), QByteArray(b"nor a state")
     window = Window(session, preferences)
     window.show()
-    assert all(not dock.isHidden() for dock in window.docks.values())
+    assert [name for name, dock in window.docks.items() if dock.isHidden()] == ["Stability"]
     window.close()
     window.deleteLater()
+
+
+def test_a_layout_from_before_a_panel_was_there_leaves_it_hidden(window, session, preferences):
+    state = window.saveState()
+    dock = window.docks["Stability"]
+    dock.setObjectName("not yet there")
+    old = window.saveState()
+    assert old != state
+    preferences.layout = window.saveGeometry(), old
+    later = Window(session, preferences)
+    later.show()
+    assert later.docks["Stability"].isHidden() and not later.docks["Scene"].isHidden()
+    later.close()
+    later.deleteLater()
 
 
 def test_recent_files_are_the_last_ten_that_exist(preferences, tmp_path):
