@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import Blob, Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus, Triangle
+from rtcore import (Blob, Box, Cone, Cylinder, Implicit, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus,
+                    Triangle)
 from rtcore.shapes import SHAPES
 from rtcore.reports.oracle import crossings, mp, nearest, vector
 
@@ -46,6 +47,8 @@ EXAMPLES = {
     "blob of eight": Blob([
         ((0.3, -0.2, 0.7), 0.8, 1.1), ((-0.7, 0.5, 0.1), 0.7, 0.9), ((0.1, 0.6, -0.4), 0.8, 1.3), ((-0.2, -0.7, 0.2), 0.7, 1),
         ((0.6, 0.3, 0.1), 0.6, 0.8), ((-0.4, -0.1, -0.6), 0.75, 1.2), ((0.5, -0.5, -0.3), 0.65, 1), ((-0.3, 0.2, 0.6), 0.7, 0.7)], 0.4),
+    "gyroid": Implicit("sin(3*x)*cos(3*y) + sin(3*y)*cos(3*z) + sin(3*z)*cos(3*x)", (-1, -0.9, -1.1), (1, 1.1, 0.9)),
+    "drop": Implicit("smin(sqrt(x^2 + y^2 + (z + .4)^2) - .6, sqrt(x^2 + y^2 + (z - .5)^2) - .4, .3)", (-1, -0.7, -1.1), (0.9, 1, 1.2)),
 }
 
 

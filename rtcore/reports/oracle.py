@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore.reports import formulas
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 try:
     import mpmath
@@ -288,8 +289,14 @@ def _blob(s: Blob, o, d):
                 yield t / speed, normal
 
 
+def _implicit(s: Implicit, o, d):
+    """See `formulas`."""
+    yield from formulas.crossings(mp, s, o, d)
+
+
 TWINS = {Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone,
-         Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron, Blob: _blob}
+         Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron, Blob: _blob,
+         Implicit: _implicit}
 
 
 # --- placed shapes ---
