@@ -1,13 +1,15 @@
 """The named solvers: right on easy rays, wrong in the ways they are known for on hard ones, and never a part of the renderer."""
 import ast
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rtcore
-from rtcore import Plane, Polygon, Quadric, Sphere, Torus, Triangle, solvers
+from rtcore import Implicit, Plane, Polygon, Quadric, Sphere, Torus, Triangle, solvers
 from rtcore.reports.oracle import crossings, mp
+from rtcore.solvers import implicit
 
 PARABOLOID = Quadric((1, 1, 0, 0, 0, 0, 0, 0, -1, 0))
 SHAPES = (Sphere((0.1, 0.2, 0.3), 1.2), Plane((0.1, 0.2, 0.3), (1, 2, 3)), Triangle((-2, -2, 0.1), (3, -1, 0.5), (0.2, 3, 0)),
@@ -46,6 +48,41 @@ def test_every_root_of_easy_rays(shape, name):
             assert len(true) == n
             for a, b in zip(true, sorted(row[:n].tolist())):
                 assert abs(b - a) <= off
+
+
+FORMULAS = ("x^2+y^2+z^2-0.6", "sin(4*x)*cos(4*y)+sin(4*y)*cos(4*z)+sin(4*z)*cos(4*x)", "smin(x,y+0.1,0.3)-z/2", "x^3-2/(y+3)+0.3-z",
+            "exp(x)-log(y+2)*sqrt(z+2)+abs(x-y)-0.8", "min(x,y)+max(y,z)-atan2(x+2,y+3)", "floor(2*x)+mod(3*y,0.7)-tan(z)",
+            "(x+2)^2.5-y^4-6")
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_formulas(text):
+    """The tape in plain arithmetic against Python's own; then where each solver says the value is 0, it nearly is."""
+    shape = Implicit(text, (-1, -1, -1), (1, 1, 1))
+    points = np.random.default_rng(6).uniform(-1, 1, (3, 200))
+    found = np.empty(200)
+    implicit.values_at(implicit.numbers(shape), points, found)
+    assert found == pytest.approx([of(text, *p) for p in points.T], rel=1e-13, abs=1e-13)
+    o = np.random.default_rng(7).uniform(-3, 3, (3, 60))
+    d = points[:, :60] - o
+    for name, off in (("sphere-tracing", 1e-3), ("bracketing", 1e-9)):
+        roots, count = solvers.roots(shape, name, np.concatenate([o, d]))
+        hits = o + roots[:, 0] * d
+        good = [abs(of(text, *p)) < off or "floor" in text for p in hits.T[count > 0]]
+        assert len(good) > 15 and all(good)
+
+
+def of(text, x, y, z):
+    """A formula's value, by Python."""
+    names = {**vars(math), "x": x, "y": y, "z": z, "abs": abs, "min": min, "max": max, "mod": lambda a, b: a - b * math.floor(a / b),
+             "smin": lambda a, b, k: min(a, b) - max(k - abs(a - b), 0) ** 2 / (4 * k)}
+    return eval(text.replace("^", "**"), names)
+
+
+def test_bracketing_takes_a_pole_for_a_root_and_misses_a_touch():
+    pole, ring = Implicit("1/x", (-1, -1, -1), (1.5, 1, 1)), Implicit("(x^2+y^2+z^2-1)^2", (-2, -2, -2), (2, 2, 2))
+    assert one(pole, "bracketing", (-2, 0, 0), (1, 0, 0)) == pytest.approx([2])
+    assert one(ring, "bracketing", (0, 0, -3), (0, 0, 1)) == []
 
 
 def test_arithmetic_is_of_the_precision():

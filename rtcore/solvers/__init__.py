@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.scene import Shape
-from rtcore.shapes import Plane, Quadric, Sphere, Torus, Triangle
-from rtcore.solvers import plane, quadric, sphere, torus, triangle
+from rtcore.shapes import Implicit, Plane, Quadric, Sphere, Torus, Triangle
+from rtcore.solvers import implicit, plane, quadric, sphere, torus, triangle
 
 RENDERER = "renderer"       # the default of every shape
 
@@ -28,8 +28,9 @@ class Method(NamedTuple):
     most: int
 
 
+MODULES = {Sphere: sphere, Plane: plane, Triangle: triangle, Quadric: quadric, Torus: torus, Implicit: implicit}
 METHODS = {shape: {name: Method(solve, module.numbers, module.MOST) for name, solve in module.SOLVERS.items()}
-           for shape, module in ((Sphere, sphere), (Plane, plane), (Triangle, triangle), (Quadric, quadric), (Torus, torus))}
+           for shape, module in MODULES.items()}
 
 
 def names(shape: type[Shape]) -> tuple[str, ...]:
