@@ -26,6 +26,8 @@ from app.theme import Theme
 
 SIZE = 1600, 1000           # of a file, in pixels
 FLOOR = -1.0                # log10 of the least error drawn, 0.1 ulp; a rounded true value is off by up to 0.5
+CEILING = {"f32": 24 * math.log10(2), "f64": 53 * math.log10(2)}       # and of the largest: not one digit is right
+DECADES = 12                # distances and scales are drawn up to ten to the power of that
 PRECISIONS = {"f32": "float32", "f64": "float64"}
 MARKS = {"f32": "s", "f64": "o"}
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -121,89 +123,109 @@ class Figure(pg.GraphicsLayoutWidget):
 
 def error_against(report: Report, shape: str, what: str, style: Style = PRINTED) -> Figure:
     """Error against `what`, "distance" or "scale": a panel per precision, a curve per solver."""
-    figure = Figure(f"{shape.capitalize()}: error against {what}", "Line: median of the rays in half a decade. Dots: the largest error "
-                    "among them. The scale is logarithmic; 0.1 ulp and less is drawn at 0.1.", style)
+    figure = Figure(f"{shape.capitalize()}: error against {what}", "Line: the median of the rays in a decade; dots: the largest error "
+                    "among them. 10⁷ ulp in float32 and 10¹⁶ in float64 mean that no digit is right.", style)
     bottom = "distance of the eye / radii of the shape" if what == "distance" else "size of the shape / scene units"
-    panels = []
     for column, (precision, name) in enumerate(PRECISIONS.items()):
         plot = figure.panel(column, name, bottom, "error of t / ulp" if column == 0 else "")
         curves = []
         for number, solver in enumerate(report.solvers(shape)):
-            points = report.points.get((shape, solver, precision))
-            if points is not None:
-                with np.errstate(divide="ignore", invalid="ignore"):
-                    logs = np.log10(points[:, [0 if what == "distance" else 1, 2]])
-                middles, medians, maxima = binned(logs[:, 0], np.maximum(logs[:, 1], FLOOR))
-                if len(middles):
-                    curves.append((number, solver, middles, medians, maxima))
-        panels.append((plot, curves))
-    top = max((c[4].max() for _, curves in panels for c in curves), default=1.0)
-    for plot, curves in panels:
+            points = report.points.get((shape, solver, precision), np.empty((0, 3)))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x, y = np.log10(points[:, [0 if what == "distance" else 1, 2]]).T
+            near = np.abs(x) <= DECADES
+            middles, medians, maxima = binned(x[near], np.clip(y[near], FLOOR, CEILING[precision]))
+            if np.isfinite(medians).any():
+                curves.append((number, solver, middles, medians, maxima))
         left = min((c[2][0] for c in curves), default=0.0)
         right = max((c[2][-1] for c in curves), default=1.0)
+        top = max([*(c[4].max() for c in curves), 1.0]) + 0.5
         width = max(right - left, 1.0)
         plot.setXRange(left - 0.04 * width, right + 0.36 * width)
-        plot.setYRange(FLOOR - 0.3, max(top, 1.0) + 0.5)
-        heights = apart([c[3][-1] for c in curves], (max(top, 1.0) + 0.8 - FLOOR) * style.line)
-        for (number, solver, middles, medians, maxima), height in zip(curves, heights):
-            color = style.color(number)
-            plot.plot(middles, medians, pen=pg.mkPen(color, width=style.letters / 6), antialias=True)
-            plot.plot(middles, maxima, pen=None, symbol="o", symbolSize=style.letters * 0.38, symbolBrush=color, symbolPen=None)
-            write(plot, solver, middles[-1] + 0.03 * width, height, color, style)
+        plot.setYRange(FLOOR - 0.3, top)
+        ends = [np.flatnonzero(np.isfinite(c[3]))[-1] for c in curves]
+        heights = apart([c[3][end] for c, end in zip(curves, ends)], (top + 0.3 - FLOOR) * style.line)
+        for (number, solver, middles, medians, maxima), end, height in zip(curves, ends, heights):
+            color, several, any_ = style.color(number), np.isfinite(medians), np.isfinite(maxima)
+            plot.plot(middles[several], medians[several], pen=pg.mkPen(color, width=style.letters / 6), antialias=True)
+            plot.plot(middles[any_], maxima[any_], pen=None, symbol="o", symbolSize=style.letters * 0.38, symbolBrush=color, symbolPen=None)
+            write(plot, solver, middles[end] + 0.03 * width, height, color, style)
     return figure
 
 
-def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure:
-    """Error against time: a mark per solver and precision, small ones for each family of rays."""
-    figure = Figure(f"{shape.capitalize()}: work and precision", "Large marks: the worst family of rays; small: each family. Squares: "
-                    "float32; circles: float64. Open, at the upper edge: hits that were missed or made up.", style)
-    plot = figure.panel(0, "", "time / ns per ray", "error of t, 99th percentile / ulp")
-    marks, failed = [], []
+class Mark(NamedTuple):
+    """A solver in one precision: its place in the diagram."""
+
+    number: int                     # of its colour
+    solver: str
+    precision: str
+    time: float                     # log10 of the median family's nanoseconds
+    families: list[tuple[float, float]]     # logarithms of each one's nanoseconds and error
+    rays: float
+    failures: float
+
+
+def marks_of(report: Report, shape: str) -> list[Mark]:
+    """What is to be drawn in a shape's work-precision diagram."""
+    marks = []
     for number, solver in enumerate(report.solvers(shape)):
         for precision in PRECISIONS:
             wanted = shape, solver, precision
             rows = [row for row in report.rows if (row.shape, row.solver, row.precision) == wanted and row.ns_per_ray > 0]
             if rows:
-                time = math.log10(float(np.median([row.ns_per_ray for row in rows])))
-                marks.append((number, solver, precision, time, [(math.log10(row.ns_per_ray), height_of(row)) for row in rows]))
-                if failures := sum(row.failures for row in rows):
-                    failed.append((number, precision, time, f"{failures:,.0f} of {sum(row.rays for row in rows):,.0f}"))
-    times = [time for *_, families in marks for time, _ in families] or [1.0]
-    heights = [height for *_, families in marks for _, height in families if height is not None]
-    low, high, top = min(times), max(times), max([*heights, 1.0])
-    width = max(high - low, 0.5)
-    plot.setXRange(low - 0.08 * width, high + 0.25 * width)
-    line = (top - FLOOR) * 1.3 * style.line     # the height of one at the upper edge, a line for each solver that fails
-    failing = list(dict.fromkeys(number for number, *_ in failed))
-    plot.setYRange(FLOOR - 0.3, top + 0.3 + line * (len(failing) + 0.5))
-    small, large = style.letters * 0.35, style.letters * 0.8
-    ends = {}
-    for number, solver, precision, time, families in marks:
-        color, drawn = style.color(number), [(t, h) for t, h in families if h is not None]
-        faded = QColor(color)
-        faded.setAlpha(110)
-        plot.plot([t for t, _ in drawn], [h for _, h in drawn], pen=None, symbol=MARKS[precision], symbolSize=small, symbolBrush=faded,
-                  symbolPen=None)
-        if drawn:
-            ends.setdefault((number, solver), []).append((time, max(h for _, h in drawn), MARKS[precision]))
-    labels = apart([points[-1][1] for points in ends.values()], 0.8 * line)
-    for ((number, solver), points), height in zip(ends.items(), labels):
-        color = style.color(number)
-        plot.plot([p[0] for p in points], [p[1] for p in points], pen=pg.mkPen(color, width=style.letters / 8),
-                  symbol=[p[2] for p in points], symbolSize=large, symbolBrush=color, symbolPen=pg.mkPen(style.paper, width=1),
-                  antialias=True)
-        write(plot, solver, points[-1][0] + 0.02 * width, height, color, style)
-    for number, precision, time, words in failed:
-        edge = top + 0.3 + line * (failing.index(number) + 0.6)
-        plot.plot([time], [edge], pen=None, symbol=MARKS[precision], symbolSize=large, symbolBrush=None,
-                  symbolPen=pg.mkPen(style.color(number), width=style.letters / 8))
-        write(plot, words, time + 0.012 * width, edge, style.color(number), style, small=True)
-    return figure
+                families = [(math.log10(row.ns_per_ray), height) for row in rows if (height := height_of(row)) is not None]
+                marks.append(Mark(number, solver, precision, math.log10(float(np.median([row.ns_per_ray for row in rows]))), families,
+                                  sum(row.rays for row in rows), sum(row.failures for row in rows)))
+    return marks
 
 
 def height_of(row: Row) -> float | None:
-    """Logarithm of a row's error, None where there is none."""
-    return max(math.log10(row.p99), FLOOR) if 0 < row.p99 < math.inf else FLOOR if row.p99 == 0 else None
+    """Logarithm of a row's error, within what is drawn; None where there is none."""
+    if math.isnan(row.p99):
+        return None
+    return min(max(math.log10(row.p99), FLOOR), CEILING[row.precision]) if row.p99 > 0 else FLOOR
+
+
+def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure:
+    """Error against time: a large mark per solver and precision, a small one for each family of rays."""
+    figure = Figure(f"{shape.capitalize()}: work and precision", "Squares: float32; circles: float64. Small: each family of rays; large: "
+                    "the median family, with a line up to the worst. Open: hits that were missed or made up.", style)
+    plot = figure.panel(0, "", "time / ns per ray", "error of t, 99th percentile / ulp")
+    marks = marks_of(report, shape)
+    times = [time for mark in marks for time, _ in mark.families] or [1.0]
+    low, high, top = min(times), max(times), max([height for mark in marks for _, height in mark.families] + [1.0])
+    width, line = max(high - low, 0.5), (top - FLOOR) * 1.3 * style.line
+    small, large = style.letters * 0.35, style.letters * 0.75
+    ends: dict[tuple[int, str], list[tuple[float, float, str]]] = {}
+    for mark in marks:
+        color, heights = style.color(mark.number), [height for _, height in mark.families]
+        faded = QColor(color)
+        faded.setAlpha(110)
+        plot.plot([time for time, _ in mark.families], heights, pen=None, symbol=MARKS[mark.precision], symbolSize=small, symbolBrush=faded,
+                  symbolPen=None)
+        if heights:
+            middle = float(np.median(heights))
+            plot.plot([mark.time] * 2, [middle, max(heights)], pen=pg.mkPen(faded, width=style.letters / 10))
+            ends.setdefault((mark.number, mark.solver), []).append((mark.time, middle, MARKS[mark.precision]))
+    labels = apart([points[-1][1] for points in ends.values()], 0.8 * line)
+    for ((number, solver), points), height in zip(ends.items(), labels):
+        color = style.color(number)
+        plot.plot([p[0] for p in points], [p[1] for p in points], pen=pg.mkPen(color, width=style.letters / 8), antialias=True,
+                  symbol=[p[2] for p in points], symbolSize=large, symbolBrush=color, symbolPen=pg.mkPen(style.paper, width=1))
+        write(plot, solver, max(p[0] for p in points) + 0.02 * width, height, color, style)
+    edge = max([top, *labels]) + 0.3        # above it a line for each solver that fails
+    failing = [number for number in dict.fromkeys(mark.number for mark in marks) if any(m.failures for m in marks if m.number == number)]
+    for place, number in enumerate(failing):
+        wrong = [mark for mark in marks if mark.number == number and mark.failures]
+        height = edge + line * (place + 0.6)
+        plot.plot([mark.time for mark in wrong], [height] * len(wrong), pen=None, symbol=[MARKS[mark.precision] for mark in wrong],
+                  symbolSize=large, symbolBrush=None, symbolPen=pg.mkPen(style.color(number), width=style.letters / 8))
+        counts = ", ".join(f"{mark.failures:,.0f} of {mark.rays:,.0f} in {PRECISIONS[mark.precision]}" for mark in wrong)
+        right = max(mark.time for mark in wrong) + 0.02 * width
+        write(plot, f"{wrong[0].solver}: {counts}", right, height, style.color(number), style, small=True)
+    plot.setXRange(low - 0.08 * width, high + 0.25 * width)
+    plot.setYRange(FLOOR - 0.3, edge + line * (len(failing) + 0.3))
+    return figure
 
 
 def apart(heights: list[float], least: float) -> list[float]:

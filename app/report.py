@@ -87,10 +87,12 @@ def _number(text: str) -> float:
     return float(text) if text else math.nan
 
 
-def binned(x: np.ndarray, y: np.ndarray, per_decade: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle, median and maximum of y in bins of x, both (n,) and as logarithms to the base 10. Bins without a point are left out."""
+def binned(x: np.ndarray, y: np.ndarray, least: int = 2) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Middle, median and maximum of y in the decades of x, both (n,) and as logarithms to the base 10. A decade with fewer than `least`
+    points has the median NaN, one without any the maximum -inf."""
     good = np.isfinite(x) & np.isfinite(y)
-    number = np.floor(x[good] * per_decade).astype(int)
-    bins = np.unique(number)
-    inside = [y[good][number == one] for one in bins]
-    return (bins + 0.5) / per_decade, np.array([np.median(part) for part in inside]), np.array([part.max() for part in inside])
+    decade = np.floor(x[good]).astype(int)
+    bins = np.arange(decade.min(), decade.max() + 1) if decade.size else np.empty(0, int)
+    inside = [y[good][decade == one] for one in bins]
+    medians = [np.median(part) if len(part) >= least else math.nan for part in inside]
+    return bins + 0.5, np.array(medians), np.array([part.max(initial=-math.inf) for part in inside])

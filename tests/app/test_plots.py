@@ -61,10 +61,12 @@ def test_a_report_that_cannot_be_read_is_told_of_in_one_line(tmp_path, content, 
 
 
 def test_bins_hold_median_and_maximum():
-    x = np.array([0.1, 0.2, 0.3, 1.6, 1.7, math.nan, 1.8])
-    y = np.array([1.0, 5.0, 3.0, 7.0, 9.0, 2.0, math.inf])
+    x = np.array([0.1, 0.2, 0.9, 3.6, 3.7, math.nan, 3.8, 1.5])
+    y = np.array([1.0, 5.0, 3.0, 7.0, 9.0, 2.0, math.inf, 4.0])
     middles, medians, maxima = binned(x, y)
-    assert middles.tolist() == [0.25, 1.75] and medians.tolist() == [3, 8] and maxima.tolist() == [5, 9]
+    assert middles.tolist() == [0.5, 1.5, 2.5, 3.5] and maxima.tolist() == [5, 4, -math.inf, 9]
+    assert np.array_equal(medians, [3, math.nan, math.nan, math.nan], equal_nan=True)
+    assert all(len(part) == 0 for part in binned(np.empty(0), np.empty(0)))
 
 
 def test_labels_are_moved_apart():
@@ -86,14 +88,24 @@ def test_every_solver_has_its_name_at_its_curve(qapp, folder, style):
 
 def test_wrong_hits_are_marked_open_at_the_upper_edge(qapp, folder):
     figure = plots.work_precision(read(folder), "torus", plots.PRINTED)
-    assert "18 of 360" in written(figure)       # Ferrari's, in either precision
+    assert "ferrari: 18 of 360 in float32, 18 of 360 in float64" in written(figure)
     plot = figure.getItem(2, 0)
     failed = [item for item in plot.listDataItems() if item.opts["symbol"] and item.opts["symbolBrush"] is None]
-    heights = {item.getData()[1][0] for item in failed}
     others = [item.getData()[1] for item in plot.listDataItems() if item not in failed]
-    assert len(failed) == 2 and min(heights) > max(np.max(y) for y in others)
-    assert max(heights) < plot.viewRange()[1][1]
+    assert len(failed) == 1 and list(failed[0].opts["symbol"]) == ["s", "o"]
+    assert np.max(np.concatenate(others)) < failed[0].getData()[1].min() and failed[0].getData()[1].max() < plot.viewRange()[1][1]
     figure.deleteLater()
+
+
+def test_errors_beyond_all_digits_and_sizes_beyond_all_scenes_do_not_squeeze_the_rest(qapp, folder):
+    report = read(folder)
+    report.points["sphere", "stable", "f32"][:3] = (1e200, 1e-200, 1.0), (10.0, 1.0, 1e30), (20.0, 1.0, math.inf)
+    for what in ("distance", "scale"):
+        plot = plots.error_against(report, "sphere", what).getItem(2, 0)
+        (left, right), (low, high) = plot.viewRange()
+        assert -14 < left < right < 20 and low < plots.FLOOR and high < 8
+    row = report.rows[0]._replace(p99=1e40)
+    assert plots.height_of(row) == plots.CEILING[row.precision] and plots.height_of(row._replace(p99=0.0)) == plots.FLOOR
 
 
 def test_axes_have_powers_of_ten(qapp):
