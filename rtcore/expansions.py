@@ -45,22 +45,27 @@ def put_products(terms, n, factor, a, b):
 
 @kernel
 def solve_quadratic(a, b, c, roots):
-    """Real roots of a s² + 2 b s + c into roots[:2], unordered; a, b, c are expansions. NaN where there are none or the form is 0
-    throughout, inf for one that a = 0 sends away."""
+    """Real roots of a s² + 2 b s + c as pairs, roots[0] and roots[1]; a, b, c are expansions. NaN where there are none or the form is 0
+    throughout, inf for one that a = 0 sends away. Returns the sign of the slope at roots[0], that at roots[1] is the opposite."""
     out_of_line()
     terms, square = np.empty(4 * LONG * LONG + LONG), np.empty(LONG)
     n = put_products(terms, 0, 1.0, b, b)
     n = put_products(terms, n, -1.0, a, c)
     expand(terms, n, square)
+    roots[:, :] = np.nan
     if square[0] < 0:
-        roots[0] = roots[1] = np.nan
-        return
+        return 0.0
     w, w1 = square_root(square[0], square[1])
     sign = 1.0 if b[0] >= 0 else -1.0
     w, e = two_sum(-b[0], -sign * w)
     w1 = e - b[1] - sign * w1
     if w == 0:      # b and the discriminant are 0
-        roots[0] = roots[1] = 0.0 if a[0] != 0 else np.nan
-        return
-    roots[0] = divide(w, w1, a[0], a[1])[0] if a[0] != 0 else np.inf
-    roots[1] = divide(c[0], c[1], w, w1)[0]
+        if a[0] != 0:
+            roots[:, :] = 0.0
+        return 0.0
+    if a[0] != 0:
+        roots[0, 0], roots[0, 1] = divide(w, w1, a[0], a[1])
+    else:
+        roots[0, 0], roots[0, 1] = np.inf, 0.0
+    roots[1, 0], roots[1, 1] = divide(c[0], c[1], w, w1)
+    return -sign if square[0] > 0 else 0.0

@@ -131,7 +131,7 @@ def settle_one(rays, i, p, f, d, radius, radius1, power, side, opacity):
     out_of_line()
     rays.tally[SLOW] += 1
     terms = np.empty(6 * LONG * LONG + 8 + LONG)
-    form, roots = np.empty((3, LONG)), np.empty(2)
+    form, roots = np.empty((3, LONG)), np.empty((2, 2))
     n = 0
     for k in range(3):
         n = put_products(terms, n, 1.0, d[k], d[k])
@@ -146,7 +146,7 @@ def settle_one(rays, i, p, f, d, radius, radius1, power, side, opacity):
     n = put_products(terms, n, -1.0, (radius, radius1), (radius, radius1))
     expand(terms, n, form[2])
     solve_quadratic(form[0], form[1], form[2], roots)
-    enter, leave = min(roots[0], roots[1]) * power, max(roots[0], roots[1]) * power
+    enter, leave = min(roots[0, 0], roots[1, 0]) * power, max(roots[0, 0], roots[1, 0]) * power
     if side & BACK == 0 and enter > rays.ray[START, i]:
         record_one(rays, i, p, enter, opacity)
     elif side & FRONT == 0:

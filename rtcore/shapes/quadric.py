@@ -1,22 +1,28 @@
 """Quadric: Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J = 0, within a box if one is given.
 
 The quadratic is taken about the ray's closest approach to the box's middle, its discriminant by differences of products with one
-rounding (Kahan), the roots by the lecture's stable pair; where A is 0 or nearly, one of them is infinite and drops out.
+rounding (Kahan), the roots by the lecture's stable pair; where A is 0 or nearly, one of them is infinite and drops out. What makes the
+answer certain is in `_second.py`.
 """
+import math
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import inverse, moved, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
-from rtcore.jit import inline, kernel
-from rtcore.lanes import along, dot, fma, load, load3, root, select, splat3, vec3, with_sign
+from rtcore.jit import kernel
+from rtcore.lanes import any_lane, bits
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import (CENTER, FRONT, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, put_placed,
-                                unit_hit)
-from rtcore.wave import DX, OX, START, record
+from rtcore.shapes._ball import lowest
+from rtcore.shapes._second import BOX, FORM, INTO, approach, exact_row, may_meet, meet, settle
+from rtcore.shapes.kind import OWN, Kind, Packed, around, forward, normalized, placed, placed_bounds, put_placed, unit_hit
+from rtcore.wave import record
 
-LOW, HIGH = OWN + 10, OWN + 13
+#: Columns after the placing: the form, the box's corners, the largest number of L, that of the form's second-degree part.
+LOW, HIGH, MOST = OWN + 10, OWN + 13, OWN + 16
 
 
 class Quadric(Shape, frozen=True):
@@ -39,91 +45,77 @@ class Quadric(Shape, frozen=True):
         return OPEN_QUADRIC if self.low is None else QUADRIC
 
     def pack(self, matrix: np.ndarray) -> Packed:
-        low, high = (np.full(3, -np.inf), np.full(3, np.inf)) if self.low is None else (np.array(self.low), np.array(self.high))
-        middle, half = (np.zeros(3), 1.0) if self.low is None else (low / 2 + high / 2, float((high / 2 - low / 2).max()))
+        invertible(matrix)
+        kind = self.kind(matrix)
+        low, high = np.array(self.low or (-1.0, -1.0, -1.0)), np.array(self.high or (1.0, 1.0, 1.0))    # a box that an open one won't use
+        middle, half = low / 2 + high / 2, power_over((high / 2 - low / 2).max())
+        form = moved_form(rationals(self.coefficients), rationals(middle), Fraction(half))
+        into = [x / Fraction(half) for row in inverse(matrix) for x in row]
+        box = [(x - m) / Fraction(half) for corner in (low, high) for x, m in zip(rationals(corner), rationals(middle))]
+        exact = np.array(exact_row(moved(matrix, middle), into, form, box))
         unit = np.diag([half] * 3 + [1.0])
         unit[:3, 3] = middle
         local = matrix @ unit
-        biggest = np.finfo(np.float32).max      # no end, in either precision
-        box = np.clip(np.concatenate([(low - middle) / half, (high - middle) / half]), -biggest, biggest)
-        return Packed(self.kind(matrix), placed(local, invertible(local), *moved(self.coefficients, middle, half), *box)[None])
+        numbers = [*exact[FORM:FORM + 10], *exact[BOX:BOX + 6], np.abs(exact[INTO:INTO + 9]).max(), np.abs(exact[FORM:FORM + 6]).max()]
+        return Packed(kind, placed(local, invertible(local), *numbers)[None], exact=exact[None])
 
 
-def moved(coefficients, middle: np.ndarray, half: float) -> np.ndarray:
-    """The coefficients (10) after p = middle + half·p', scaled so that the largest is 1."""
+def power_over(size: float) -> float:
+    """The least power of two that is not below `size`."""
+    mantissa, exponent = np.frexp(size)
+    return float(np.ldexp(1.0, exponent - (mantissa == 0.5)))
+
+
+def moved_form(coefficients, middle, half) -> list[Fraction]:
+    """The coefficients (10) after p = middle + half·p', over a power of two near the largest; all rationals."""
     a, b, c, d, e, f, g, h, i, j = coefficients
-    form = np.array([[a, d / 2, e / 2], [d / 2, b, f / 2], [e / 2, f / 2, c]])
-    slope = np.array([g, h, i])
-    constant = middle @ form @ middle + slope @ middle + j
-    slope, form = (slope + 2 * form @ middle) * half, form * half * half
-    result = np.array([*np.diag(form), 2 * form[0, 1], 2 * form[0, 2], 2 * form[1, 2], *slope, constant])
-    return result / np.abs(result).max()
-
-
-@inline
-def difference(a, b, c, d):
-    """a·b - c·d with a rounding error of the result's own size (Kahan; Jeannerod, Louvet, Muller 2013)."""
-    w = c * d
-    return fma(a, b, -w) - fma(c, d, -w)
-
-
-@inline
-def hit_quadric(rays, i, p, o, d, data, q, side, opacity):
-    """Eight rays, o and d in the unit space of quadric q."""
-    k = OWN
-    start = load(rays.ray, START, i)
-    shift = -dot(o, d) / dot(d, d)
-    n = along(o, shift, d)
-    pull, mixed, slope = splat3(data, q, k), splat3(data, q, k + 3), splat3(data, q, k + 6)
-    # half the gradient's form at d and at n
-    md = vec3(2 * pull.x * d.x + mixed.x * d.y + mixed.y * d.z, mixed.x * d.x + 2 * pull.y * d.y + mixed.z * d.z,
-              mixed.y * d.x + mixed.z * d.y + 2 * pull.z * d.z)
-    mn = vec3(2 * pull.x * n.x + mixed.x * n.y + mixed.y * n.z, mixed.x * n.x + 2 * pull.y * n.y + mixed.z * n.z,
-              mixed.y * n.x + mixed.z * n.y + 2 * pull.z * n.z)
-    a = 0.5 * dot(md, d)
-    b = 0.5 * (dot(mn, d) + dot(slope, d))
-    c = 0.5 * dot(mn, n) + dot(slope, n) + data[q, k + 9]
-    w = -(b + with_sign(root(difference(b, b, a, c)), b))
-    s0, s1 = w / a, c / w
-    best = 0 * start + np.inf
-    low, high = splat3(data, q, LOW), splat3(data, q, HIGH)
-    for j in range(2):
-        s = s0 if j == 0 else s1
-        h = along(n, s, d)
-        t = s + shift
-        ok = (t > start) & (h.x >= low.x) & (h.y >= low.y) & (h.z >= low.z) & (h.x <= high.x) & (h.y <= high.y) & (h.z <= high.z)
-        if side != 0:
-            facing = a * s + b
-            ok = ok & (facing < 0) if side & FRONT else ok & (facing > 0)
-        best = select(ok & (t < best), t, best)
-    record(rays, i, p, best, best < np.inf, opacity)
+    x, y, z = middle
+    slope = [2 * a * x + d * y + e * z + g, d * x + 2 * b * y + f * z + h, e * x + f * y + 2 * c * z + i]
+    rest = (x * (slope[0] + g) + y * (slope[1] + h) + z * (slope[2] + i)) / 2 + j
+    result = [*(k * half * half for k in (a, b, c, d, e, f)), *(k * half for k in slope), rest]
+    scale = Fraction(2) ** math.frexp(max(map(abs, result)))[1]
+    return [k / scale for k in result]
 
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
-    data = table.data
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree)
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        o = into(data, q, load3(rays.ray, OX, i) - splat3(data, q, CENTER))
-                        hit_quadric(rays, i, first + q, o, into(data, q, load3(rays.ray, DX, i)), data, q, table.side[q], opacity)
+                        near = approach(rays.ray, i, table.exact, q, most, curved)
+                        todo = may_meet(near)
+                        if any_lane(todo):
+                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, True, todo, near, table.side[q])
+                            record(rays, i, first + q, t, found, opacity)
+                            late = bits(unsure)
+                            while late:
+                                settle(rays, i + lowest(late), first + q, table, q, True, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
 
 @kernel
 def intersect_open(rays, n, tree, table, first, opacity):
-    data = table.data
-    for q in range(data.shape[0]):
+    for q in range(table.data.shape[0]):
+        most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
         for i in range(0, n, 8):
-            o = into(data, q, load3(rays.ray, OX, i) - splat3(data, q, CENTER))
-            hit_quadric(rays, i, first + q, o, into(data, q, load3(rays.ray, DX, i)), data, q, table.side[q], opacity)
+            near = approach(rays.ray, i, table.exact, q, most, curved)
+            todo = may_meet(near)
+            if any_lane(todo):
+                t, found, unsure = meet(rays.ray, i, table.exact, q, most, False, todo, near, table.side[q])
+                record(rays, i, first + q, t, found, opacity)
+                late = bits(unsure)
+                while late:
+                    settle(rays, i + lowest(late), first + q, table, q, False, opacity)
+                    late &= late - 1
 
 
 @kernel

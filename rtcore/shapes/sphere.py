@@ -95,8 +95,8 @@ def meet(ray, i, data, exact, q, todo, far, near, side):
     z, z1 = two_sum(o.z, -c.z)
     f, f1 = vec3(x, y, z) * unpower, (vec3(x1, y1, z1) - splat3(exact, q, 3)) * unpower
     end, zero = load(ray, T, i), 0 * x
-    s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero, far, extent(d),
-                              wide(load(ray, START, i)) * unpower, wide(end) * unpower, side)
+    s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero,
+                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, wide(end) * unpower, side)
     return rounded(s * np.float64(data[q, 4]), end), found, unsure
 
 
@@ -188,7 +188,8 @@ def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
     f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, 3))
     end, zero = load(ray, T, i), 0 * x
     v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
-    s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far, np.float64(data[q, MOST]) * extent(d),
+    most = np.float64(data[q, MOST])
+    s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(c), most * extent(d),
                               wide(load(ray, START, i)), wide(end), side)
     return rounded(s, end), found, unsure
 

@@ -1,0 +1,330 @@
+"""The ray and a surface of second degree, with a certain answer, in the manner of `_ball.py`.
+
+The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers at most about 1, in a unit space that the exact matrix L leads
+to; a box there, or the whole space, says which of its points belong to the surface. Along a ray about its closest approach to the unit
+space's origin it is a s² + 2 b s + c.
+
+Columns of Table.exact: three parts each of the centre, of L by rows, of the ten numbers; then two parts of the box's corners.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.exact import parts
+from rtcore.expansions import LONG, expand, put_products, solve_quadratic
+from rtcore.jit import inline, kernel, out_of_line
+from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
+from rtcore.pairs import add, multiply, two_sum
+from rtcore.shapes._ball import U64, advance, certain, extent
+from rtcore.shapes.kind import BACK, FRONT
+from rtcore.wave import DX, OX, SLOW, START, T, record_one
+
+CENTER, INTO, FORM, BOX = 0, 9, 36, 66
+GONE = 2.0 ** 14    # how far a bound must be surpassed for plain arithmetic to be a good start
+
+
+def exact_row(center, into, form, box) -> list[float]:
+    """A row of Table.exact from rationals: centre (3), L (9), the form's numbers (10), the box's corners (6)."""
+    return [*parts(center, 3), *parts(into, 3), *parts(form, 3), *parts(box)]
+
+
+class Near(NamedTuple):
+    """What plain arithmetic says of eight rays and a surface, with bounds on its errors."""
+
+    shift: object       # t of the closest approach
+    a: object
+    b: object
+    c: object
+    blur: object        # bound on the error of a
+    off: object         # discriminant
+    fuzz: object        # bound on its error
+    far: object         # what the error of the ray's origin in unit space is a rounding of
+    speed: object       # bound on the length of its direction there
+    reach: object       # |x| + |y| + |z| of the closest approach
+
+
+@inline
+def times(exact, q, v):
+    """L v by the leading parts of L."""
+    a, b, c = splat3(exact, q, INTO), splat3(exact, q, INTO + 3), splat3(exact, q, INTO + 6)
+    return vec3(a.x * v.x + a.y * v.y + a.z * v.z, b.x * v.x + b.y * v.y + b.z * v.z, c.x * v.x + c.y * v.y + c.z * v.z)
+
+
+@inline
+def row(exact, q, k, v, v1):
+    """Row k of L times (v + v1), as a pair."""
+    a, b, zero = INTO + 3 * k, INTO + 9 + 3 * k, 0 * v.x
+    x, x1 = multiply(v.x, v1.x, exact[q, a] + zero, exact[q, b] + zero)
+    y, y1 = multiply(v.y, v1.y, exact[q, a + 1] + zero, exact[q, b + 1] + zero)
+    z, z1 = multiply(v.z, v1.z, exact[q, a + 2] + zero, exact[q, b + 2] + zero)
+    s, s1 = add(x, x1, y, y1)
+    return add(s, s1, z, z1)
+
+
+@inline
+def into_pairs(exact, q, v, v1):
+    """L (v + v1), as pairs."""
+    x, x1 = row(exact, q, 0, v, v1)
+    y, y1 = row(exact, q, 1, v, v1)
+    z, z1 = row(exact, q, 2, v, v1)
+    return vec3(x, y, z), vec3(x1, y1, z1)
+
+
+@inline
+def steepness(pull, mixed, v):
+    """The gradient of the form's second-degree part at v."""
+    return vec3(2 * pull.x * v.x + mixed.x * v.y + mixed.y * v.z, mixed.x * v.x + 2 * pull.y * v.y + mixed.z * v.z,
+                mixed.y * v.x + mixed.z * v.y + 2 * pull.z * v.z)
+
+
+@inline
+def difference(a, b, c, d):
+    """a·b - c·d with a rounding error of the result's own size (Kahan; Jeannerod, Louvet, Muller 2013)."""
+    w = c * d
+    return fma(a, b, -w) - fma(c, d, -w)
+
+
+@inline
+def approach(ray, i, exact, q, most, curved):
+    """Eight rays and surface q, plainly. most: the largest number of L; curved: that of the form's second-degree part."""
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, CENTER)) - splat3(exact, q, CENTER + 3), wide(load3(ray, DX, i))
+    f, d = times(exact, q, g), times(exact, q, v)
+    shift = -dot(f, d) / dot(d, d)
+    n = along(f, shift, d)
+    pull, mixed, slope = splat3(exact, q, FORM), splat3(exact, q, FORM + 3), splat3(exact, q, FORM + 6)
+    md, mn = steepness(pull, mixed, d), steepness(pull, mixed, n)
+    a, b = 0.5 * dot(md, d), 0.5 * (dot(mn, d) + dot(slope, d))
+    c = 0.5 * dot(mn, n) + dot(slope, n) + exact[q, FORM + 9]
+    far, speed, reach = most * (extent(g) + extent(v) * size(shift)), most * extent(v), extent(n)
+    blur, blur_b, blur_c = 32 * U64 * curved * speed * speed, 32 * U64 * speed * (far + 1), 64 * U64 * (far + 1) * (reach + 1)
+    off = difference(b, b, a, c)
+    fuzz = 2 * size(b) * blur_b + size(a) * blur_c + size(c) * blur + blur * blur_c + blur_b * blur_b + 4 * U64 * size(off)
+    return Near(shift, a, b, c, blur, off, fuzz, far, speed, reach)
+
+
+@inline
+def may_meet(near):
+    """Lanes that may cross the surface."""
+    return ~(near.off < -near.fuzz)
+
+
+class Form(NamedTuple):
+    """The form's numbers, each a pair of lanes: of x² y² z², xy xz yz, x y z, and 1."""
+
+    pull: object
+    pull1: object
+    mixed: object
+    mixed1: object
+    slope: object
+    slope1: object
+    rest: object
+    rest1: object
+
+
+@inline
+def form_of(exact, q, zero):
+    """The form of surface q."""
+    return Form(splat3(exact, q, FORM), splat3(exact, q, FORM + 10), splat3(exact, q, FORM + 3), splat3(exact, q, FORM + 13),
+                splat3(exact, q, FORM + 6), splat3(exact, q, FORM + 16), exact[q, FORM + 9] + zero, exact[q, FORM + 19] + zero)
+
+
+@inline
+def value(m, x, x1, y, y1, z, z1):
+    """The form at (x, y, z), all in pairs; only the leading part."""
+    p, p1 = linear(m.slope.x, m.slope1.x, m.pull.x, m.pull1.x, x, x1)
+    p, p1 = linear(p, p1, m.mixed.x, m.mixed1.x, y, y1)
+    p, p1 = linear(p, p1, m.mixed.y, m.mixed1.y, z, z1)
+    q, q1 = linear(m.slope.y, m.slope1.y, m.pull.y, m.pull1.y, y, y1)
+    q, q1 = linear(q, q1, m.mixed.z, m.mixed1.z, z, z1)
+    r, r1 = linear(m.slope.z, m.slope1.z, m.pull.z, m.pull1.z, z, z1)
+    s, s1 = linear(m.rest, m.rest1, p, p1, x, x1)
+    s, s1 = linear(s, s1, q, q1, y, y1)
+    return linear(s, s1, r, r1, z, z1)[0]
+
+
+@inline
+def linear(s, s1, a, a1, x, x1):
+    """s + a x, in pairs."""
+    p, p1 = multiply(a, a1, x, x1)
+    return add(s, s1, p, p1)
+
+
+@inline
+def polish(m, near, f, f1, v, v1, far, s):
+    """One Newton step on the form from t = s; its slope; a bound on what the step leaves, times the slope; the point reached and a bound
+    on the latter's error. f, as a pair, may be off by some roundings, in pairs, of `far`."""
+    x, x1 = advance(f.x, f1.x, s, v.x, v1.x)
+    y, y1 = advance(f.y, f1.y, s, v.y, v1.y)
+    z, z1 = advance(f.z, f1.z, s, v.z, v1.z)
+    p = vec3(x, y, z)
+    slope = dot(steepness(m.pull, m.mixed, p) + m.slope, v)
+    step = value(m, x, x1, y, y1, z, z1) / slope
+    grow = 1 + extent(p)
+    # the slope is off by some roundings of speed·grow, the form by as many of 2⁻¹⁰⁶ (far + 1)·grow
+    left = size(near.a) * step * step + 32 * U64 * near.speed * grow * size(step) + 256 * U64 * U64 * (far + 1) * grow
+    return s - step, slope, left, along(p, -step, v)
+
+
+@inline
+def within(p, low, high, margin):
+    """Lanes whose point is surely in the box, and those where it may be."""
+    sure = ((p.x >= low.x + margin) & (p.y >= low.y + margin) & (p.z >= low.z + margin)
+            & (p.x <= high.x - margin) & (p.y <= high.y - margin) & (p.z <= high.z - margin))
+    maybe = ((p.x >= low.x - margin) & (p.y >= low.y - margin) & (p.z >= low.z - margin)
+             & (p.x <= high.x + margin) & (p.y <= high.y + margin) & (p.z <= high.z + margin))
+    return sure, maybe
+
+
+@inline
+def choose(todo, near, m, f, f1, v, v1, far, low, high, bounded, start, end, side):
+    """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. No array may come in here,
+    see `_ball.choose`."""
+    w = -(near.b + with_sign(root(near.off), near.b))
+    s0, s1 = w / near.a, near.c / w
+    lead = size(near.a) + near.blur
+    # the root w/a lies beyond the box, or nowhere as a is 0
+    gone = (lead <= 0) | (lead * (near.reach + 2) < size(w) * root(dot(v, v))) if bounded else lead <= 0
+    sure = (near.off > GONE * near.fuzz) & (gone | (size(near.a) > GONE * near.blur))
+    unsure = todo & ~sure
+    todo = todo & sure
+    slack = 2.0 ** -6 * (size(s0) + size(s1))
+    t0, t1 = select(gone, np.inf, s0 + near.shift), s1 + near.shift
+    swap = t1 < t0
+    t = 0 * w
+    found = todo & ~todo
+    for k in range(2):
+        guess = select(swap, t1, t0) if k == 0 else select(swap, t0, t1)
+        want = todo & (guess + slack > start) & (guess - slack < end) & (guess < np.inf)
+        if any_lane(want):
+            r, slope, left, p = polish(m, near, f, f1, v, v1, far, guess)
+            steep = size(slope)
+            ok = certain(r, steep, left, start, end)
+            hit = want & ok & (r > start) & (r < end)
+            if bounded:
+                inside, maybe = within(p, low, high, 8 * U64 * (2 + near.reach) + near.speed * (left / steep + 2 * U64 * size(r)))
+                ok = ok & (inside | ~maybe)
+                hit = hit & inside
+            if side & FRONT:
+                hit = hit & (slope < 0)
+            elif side & BACK:
+                hit = hit & (slope > 0)
+            unsure = unsure | (want & ~ok)
+            hit = hit & ok
+            t = select(hit, r, t)
+            found = found | hit
+            todo = todo & ok & ~hit | (todo & ~want)
+    return t, found, unsure
+
+
+@inline
+def meet(ray, i, exact, q, most, bounded, todo, near, side):
+    """`choose` for surface q; t in the rays' precision."""
+    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, CENTER)
+    x, x1 = two_sum(o.x, -c.x)
+    y, y1 = two_sum(o.y, -c.y)
+    z, z1 = two_sum(o.z, -c.z)
+    zero = 0 * x
+    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, CENTER + 3))
+    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
+    end = load(ray, T, i)
+    t, found, unsure = choose(todo, near, form_of(exact, q, zero), f, f1, v, v1, near.far + most * extent(c), splat3(exact, q, BOX),
+                              splat3(exact, q, BOX + 3), bounded, wide(load(ray, START, i)), wide(end), side)
+    return rounded(t, end), found, unsure
+
+
+# --- the slow way ---
+
+@kernel
+def ray_parts(ray, i, exact, q, f, d):
+    """Ray i in the unit space of surface q, as expansions (3, LONG)."""
+    out_of_line()
+    g, terms, more = np.empty((3, LONG)), np.empty(36 * LONG + LONG), np.empty(18 + LONG)
+    for k in range(3):
+        terms[0], terms[1], terms[2], terms[3] = ray[OX + k, i], -exact[q, k], -exact[q, 3 + k], -exact[q, 6 + k]
+        expand(terms, 4, g[k])
+    for k in range(3):
+        n, m = 0, 0
+        for j in range(3):
+            a = INTO + 3 * k + j
+            factor = exact[q, a], exact[q, a + 9], exact[q, a + 18]
+            n = put_products(terms, n, 1.0, factor, g[j])
+            m = put_products(more, m, 1.0, factor, (np.float64(ray[DX + j, i]),))
+        expand(terms, n, f[k])
+        expand(more, m, d[k])
+
+
+@kernel
+def second_parts(exact, q, v, out):
+    """Half the gradient of the form's second-degree part at v, as expansions (3, LONG) like v."""
+    out_of_line()
+    terms = np.empty(18 * LONG + LONG)
+    places = ((0, 3, 4), (3, 1, 5), (4, 5, 2))      # of the numbers of x², y², z², xy, xz, yz in a matrix
+    for k in range(3):
+        n = 0
+        for j in range(3):
+            a = FORM + places[k][j]
+            share = 1.0 if j == k else 0.5
+            n = put_products(terms, n, share, (exact[q, a], exact[q, a + 10], exact[q, a + 20]), v[j])
+        expand(terms, n, out[k])
+
+
+@kernel
+def settle(rays, i, p, table, q, bounded, opacity):
+    """Ray i against surface q, the slow and certain way."""
+    out_of_line()
+    rays.tally[SLOW] += 1
+    exact, ray, side = table.exact, rays.ray, table.side[q]
+    f, d, mf, md = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG))
+    ray_parts(ray, i, exact, q, f, d)
+    second_parts(exact, q, f, mf)
+    second_parts(exact, q, d, md)
+    terms, form, roots = np.empty(6 * LONG * LONG + 18 * LONG + 3 + LONG), np.empty((3, LONG)), np.empty((2, 2))
+    n = 0
+    for k in range(3):
+        n = put_products(terms, n, 1.0, md[k], d[k])
+    expand(terms, n, form[0])
+    n = 0
+    for k in range(3):
+        a = FORM + 6 + k
+        n = put_products(terms, n, 1.0, mf[k], d[k])
+        n = put_products(terms, n, 0.5, (exact[q, a], exact[q, a + 10], exact[q, a + 20]), d[k])
+    expand(terms, n, form[1])
+    n = 0
+    for k in range(3):
+        a = FORM + 6 + k
+        n = put_products(terms, n, 1.0, mf[k], f[k])
+        n = put_products(terms, n, 1.0, (exact[q, a], exact[q, a + 10], exact[q, a + 20]), f[k])
+    terms[n], terms[n + 1], terms[n + 2] = exact[q, FORM + 9], exact[q, FORM + 19], exact[q, FORM + 29]
+    expand(terms, n + 3, form[2])
+    slope = solve_quadratic(form[0], form[1], form[2], roots)
+    first = 0 if roots[0, 0] <= roots[1, 0] else 1
+    for k in range(2):
+        j = first if k == 0 else 1 - first
+        falls = slope < 0 if j == 0 else slope > 0
+        rises = slope > 0 if j == 0 else slope < 0
+        if (side & FRONT and not falls) or (side & BACK and not rises):
+            continue
+        if abs(roots[j, 0]) < np.inf and (not bounded or in_box(exact, q, f, d, roots[j])) and ray[START, i] < roots[j, 0] <= ray[T, i]:
+            record_one(rays, i, p, roots[j, 0], opacity)
+            return
+
+
+@kernel
+def in_box(exact, q, f, d, t):
+    """Whether the point f + t d of the unit space, in expansions, t a pair, is in the box of surface q, its sides included."""
+    out_of_line()
+    terms, over = np.empty(5 * LONG + 2 + LONG), np.empty(LONG)
+    for k in range(3):
+        for end in range(2):
+            corner = BOX + 3 * end + k
+            n = 0
+            for j in range(LONG):
+                terms[n] = f[k, j]
+                n += 1
+            n = put_products(terms, n, 1.0, t, d[k])
+            terms[n], terms[n + 1] = -exact[q, corner], -exact[q, corner + 6]
+            expand(terms, n + 2, over)
+            beyond = -over[0] if end == 0 else over[0]
+            if beyond > 2.0 ** -98 * (abs(f[k, 0]) + abs(t[0] * d[k, 0])):
+                return False
+    return True
