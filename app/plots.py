@@ -38,7 +38,8 @@ ON_DARK = ("#56b4e9", "#e8833a", "#2cc79a", "#e08fc0", "#e6c229", "#d0d0d0", "#8
 
 
 class Style(NamedTuple):
-    """How a figure looks: its paper and inks, the size of its letters in pixels, and a line of them as a share of a plot's height."""
+    """How a figure looks: its paper and inks, the size of its letters in pixels; a line of them as a share of a plot's height, and a letter
+    as a share of a figure's width."""
 
     paper: str
     ink: str
@@ -46,23 +47,31 @@ class Style(NamedTuple):
     colors: tuple[str, ...]
     letters: int
     line: float
+    letter: float
 
     def color(self, number: int) -> str:
         """The colour of the curve of that number."""
         return self.colors[number % len(self.colors)]
 
+    def margin(self, names: list[str], plots: int) -> float:
+        """Room for names at the right, as a share of the width of what is drawn, where so many plots stand side by side."""
+        share = 0.06 + plots * self.letter * max(map(len, names), default=0)
+        return share / (1 - share)
 
-PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21, 0.05)
+
+PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21, 0.05, 0.009)
 
 
 def on_screen(theme: Theme) -> Style:
     """The style of a figure within the window."""
-    return Style(theme.panel, theme.text, theme.muted, ON_DARK if theme.name == "dark" else ON_LIGHT, 12, 0.11)
+    return Style(theme.panel, theme.text, theme.muted, ON_DARK if theme.name == "dark" else ON_LIGHT, 12, 0.11, 0.0065)
 
 
 class Decades(pg.AxisItem):
     """An axis of logarithms to the base 10: labels at powers of ten, as many as fit, with small ticks between them; where less than two
-    powers are in sight, at 1, 2 and 5 of each."""
+    powers are in sight, at 1, 2 and 5 of each. Nothing above `most` has a tick."""
+
+    most = math.inf
 
     def tickValues(self, low: float, high: float, size: float):
         decades = range(math.floor(low), math.ceil(high) + 1)
@@ -73,7 +82,7 @@ class Decades(pg.AxisItem):
         else:
             labelled = [float(n) for n in decades if n % step == 0]
         between = ticks if step == 1 else [float(n) for n in decades]
-        labelled, between = ([x for x in values if low <= x <= high] for values in (labelled, between))
+        labelled, between = ([x for x in values if low <= x <= min(high, self.most)] for values in (labelled, between))
         return [(step, labelled), (0.1, [x for x in between if x not in labelled])]
 
     def tickStrings(self, values, scale, spacing):
@@ -141,7 +150,7 @@ def error_against(report: Report, shape: str, what: str, style: Style = PRINTED)
         right = max((c[2][-1] for c in curves), default=1.0)
         top = max([*(c[4].max() for c in curves), 1.0]) + 0.5
         width = max(right - left, 1.0)
-        plot.setXRange(left - 0.04 * width, right + 0.36 * width)
+        plot.setXRange(left - 0.04 * width, right + style.margin([c[1] for c in curves], 2) * width)
         plot.setYRange(FLOOR - 0.3, top)
         ends = [np.flatnonzero(np.isfinite(c[3]))[-1] for c in curves]
         heights = apart([c[3][end] for c, end in zip(curves, ends)], (top + 0.3 - FLOOR) * style.line)
@@ -221,9 +230,11 @@ def work_precision(report: Report, shape: str, style: Style = PRINTED) -> Figure
         plot.plot([mark.time for mark in wrong], [height] * len(wrong), pen=None, symbol=[MARKS[mark.precision] for mark in wrong],
                   symbolSize=large, symbolBrush=None, symbolPen=pg.mkPen(style.color(number), width=style.letters / 8))
         counts = ", ".join(f"{mark.failures:,.0f} of {mark.rays:,.0f} in {PRECISIONS[mark.precision]}" for mark in wrong)
-        right = max(mark.time for mark in wrong) + 0.02 * width
-        write(plot, f"{wrong[0].solver}: {counts}", right, height, style.color(number), style, small=True)
-    plot.setXRange(low - 0.08 * width, high + 0.25 * width)
+        first, last = min(mark.time for mark in wrong), max(mark.time for mark in wrong)
+        at = first - 0.02 * width if first - low > high - last else last + 0.02 * width
+        write(plot, f"{wrong[0].solver}: {counts}", at, height, style.color(number), style, small=True, left=at < first)
+    plot.getAxis("left").most = top
+    plot.setXRange(low - 0.08 * width, high + style.margin([mark.solver for mark in marks], 1) * width)
     plot.setYRange(FLOOR - 0.3, edge + line * (len(failing) + 0.3))
     return figure
 
@@ -236,9 +247,9 @@ def apart(heights: list[float], least: float) -> list[float]:
     return result
 
 
-def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, small: bool = False):
-    """Write to the right of a point."""
-    label = pg.TextItem(text, color=color, anchor=(0, 0.5))
+def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, small: bool = False, left: bool = False):
+    """Write to the right of a point, or to the left."""
+    label = pg.TextItem(text, color=color, anchor=(1 if left else 0, 0.5))
     font = QFont()
     font.setPixelSize(round(style.letters * (0.75 if small else 0.95)))
     font.setWeight(QFont.Weight.DemiBold)
