@@ -18,13 +18,14 @@ class Film(NamedTuple):
     node: np.ndarray        # int32 (h·w): the leaf that sample 0 hit first, -1 none
     distance: np.ndarray    # float32 (h·w): how far away, inf none
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
+    doubt: np.ndarray       # uint8 (h·w): 1 where that hit has no proof
 
 
 def new_film(width: int, height: int) -> Film:
     """An empty film."""
     n = width * height
     return Film(np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int32), np.full(n, -1, np.int32), np.full(n, np.inf, np.float32),
-                np.zeros((n, 3), np.float32))
+                np.zeros((n, 3), np.float32), np.zeros(n, np.uint8))
 
 
 @kernel
@@ -36,6 +37,14 @@ def note_first_hits(film, wave, n, target, leaf):
         film.distance[p] = wave.rays.ray[T, i]
         for k in range(3):
             film.normal[p, k] = wave.surface[NX + k, i] if prim >= 0 else 0
+
+
+@kernel
+def note_doubt(film, wave, n, target, first, last):
+    """Which primary rays hit one of the primitives first .. last - 1, of a kind that can be in doubt, without a proof."""
+    for i in range(n):
+        if first <= wave.rays.prim[i] < last:
+            film.doubt[target[i]] = wave.rays.doubt[i]
 
 
 @kernel
@@ -80,8 +89,8 @@ def develop(film, width, height, spacing, pixels):
 
 
 @kernel
-def fill(film, width, height, spacing, node, distance, normal):
-    """First hits over the whole picture, (h, w), (h, w) and (h, w, 3), as `develop` fills it."""
+def fill(film, width, height, spacing, node, distance, normal, doubt):
+    """First hits over the whole picture, (h, w) but for the normals (h, w, 3), as `develop` fills it."""
     for y in range(height):
         for x in range(width):
             p, step = y * width + x, 1
@@ -90,6 +99,7 @@ def fill(film, width, height, spacing, node, distance, normal):
                 p = y // step * step * width + x // step * step
             node[y, x] = film.node[p]
             distance[y, x] = film.distance[p]
+            doubt[y, x] = film.doubt[p]
             for k in range(3):
                 normal[y, x, k] = film.normal[p, k]
 

@@ -163,10 +163,10 @@ class Render:
         """The picture as it is now."""
         width, height = self.settings.size
         pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
-        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+        node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
         films.develop(self.film, width, height, COARSEST, pixels)
-        films.fill(self.film, width, height, COARSEST, node, distance, normal)
-        shown = VIEW[self.settings.view].draw(pixels, node, distance, normal)
+        films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
+        shown = VIEW[self.settings.view].draw(pixels, node, distance, normal, doubt)
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done)
 

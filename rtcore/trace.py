@@ -11,6 +11,7 @@ from rtcore.lights import AIMS
 from rtcore.plan import VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.settings import Settings
+from rtcore.shapes import DOUBTFUL
 from rtcore.wave import Wave, new_beam, new_wave
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
@@ -82,6 +83,9 @@ class Tracer:
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
         if sample == 0:
             films.note_first_hits(film, wave, n, scratch.target, self.geometry.leaf)
+            for group in self.geometry.groups:
+                if group.kind in DOUBTFUL:
+                    films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
         if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale):
             return False
         counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)

@@ -1,7 +1,8 @@
 """Views: one file each, what a finished or growing film is shown as. Listed once, here."""
 from rtcore.views.beauty import BEAUTY
+from rtcore.views.certified import CERTIFIED
 from rtcore.views.depth import DEPTH
 from rtcore.views.normal import NORMAL
 from rtcore.views.object import OBJECT
 
-VIEWS = (BEAUTY, NORMAL, DEPTH, OBJECT)
+VIEWS = (BEAUTY, NORMAL, DEPTH, OBJECT, CERTIFIED)

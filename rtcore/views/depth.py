@@ -4,7 +4,7 @@ import numpy as np
 from rtcore.views.view import View
 
 
-def draw(pixels, node, distance, normal):
+def draw(pixels, node, distance, normal, doubt):
     hit = node >= 0
     out = np.zeros((*node.shape, 3), np.float32)
     if hit.any():
