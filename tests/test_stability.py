@@ -9,7 +9,7 @@ import pytest
 from commandline import ENVIRONMENT, one_line, run_here
 
 import rtcore
-from rtcore import Blob, Box, Cylinder, Mesh, Plane, Polygon, Scale, Sphere, Torus, solvers
+from rtcore import Blob, Box, Cylinder, Implicit, Mesh, Plane, Polygon, Scale, Sphere, Torus, solvers
 from rtcore.reports import measure, stability
 from rtcore.reports.catalogue import CATALOGUE
 from rtcore.reports.condition import FORMS, condition
@@ -89,7 +89,7 @@ def test_condition_is_the_sensitivity(shape):
     moved = []
     for _ in range(25):
         shift = iter(rng.choice([-1e-12, 1e-12], 2000))
-        near = batch.shape.rounded(lambda x, shift=shift: x * (1 + next(shift))) if shape not in (Mesh, Polygon) else batch.shape
+        near = batch.shape.rounded(lambda x, shift=shift: x * (1 + next(shift))) if shape not in (Implicit, Mesh, Polygon) else batch.shape
         hits = crossings(near, HERE, o * (1 + rng.choice([-1e-12, 1e-12], 3)), d * (1 + rng.choice([-1e-12, 1e-12], 3)))
         moved.append(float(min((abs(c.t - t) for c in hits), default=0) / t))
     assert max(moved) <= allowed * 1.001 and max(moved) >= allowed / 50

@@ -6,11 +6,12 @@ import numpy as np
 
 from rtcore.api import intersect, occluded
 from rtcore.flatten import DTYPES, flatten
+from rtcore.reports.catalogue import CUBE
 from rtcore.reports.families import batches, families
 from rtcore.reports.meshes import MESHES
 from rtcore.reports.rows import Row, Worst, example
 from rtcore.scene import Matrix, Node, Scene, Shape
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Quadric, Sphere, Torus, Triangle
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Quadric, Sphere, Torus, Triangle
 from rtcore.solvers import RENDERER, names, roots
 from rtcore.trace import CLOSEST
 from rtcore.wave import DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
@@ -21,9 +22,10 @@ CHUNK = 100_000
 CONVEX = (Sphere((0.3, -0.2, 0.1), 0.9), Plane((0.1, 0.2, 0.3), (1, -2, 0.5)), Triangle((-1, -1, 0.2), (1.2, -0.7, -0.4), (0.1, 1.3, 0.3)),
           Mesh([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)], [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]),
           Polygon(((-1, -1, 0), (1, -1, 0), (1, 0, 0), (0, 0, 0), (0, 1, 0))), Box((-1, -0.5, -0.7), (0.4, 1, 0.3)),
-          Cylinder((-0.3, -0.8, 0.1), (0.4, 0.7, -0.2), 0.6), Cone((0, 0, -0.75), 0.4, (0, 0, 0.75), 0.9))
+          Cylinder((-0.3, -0.8, 0.1), (0.4, 0.7, -0.2), 0.6), Cone((0, 0, -0.75), 0.4, (0, 0, 0.75), 0.9), CUBE)
 CURVED = (Torus(0.7, 0.25), Quadric((4, 4, -2, 0, 0, 0, 0, 0, 0, -1), (-1, -1, -1), (1, 1, 1)),
-          Blob((((-0.3, 0, 0), 0.7, 1), ((0.4, 0.1, 0), 0.7, 1)), 0.4))
+          Blob((((-0.3, 0, 0), 0.7, 1), ((0.4, 0.1, 0), 0.7, 1)), 0.4),
+          Implicit("(x^2+y^2+z^2+0.24)^2-1.2*(x^2+y^2)", (-1, -1, -1), (1, 1, 1)))
 MODELS = {type(shape): shape for shape in CONVEX + CURVED}
 FLAT = (Plane, Triangle, Polygon)
 NEAR, STEEP = 0.02, 0.2

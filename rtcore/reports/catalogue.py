@@ -2,7 +2,7 @@
 from typing import NamedTuple
 
 from rtcore.scene import Rotate, Scale, Shape, Shear, Translate
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 X, Y, UP, DOWN = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)
 ORIGIN = (0, 0, 0)
@@ -143,7 +143,24 @@ def _blob():
     yield Case(Blob(((ORIGIN, 1, 1),), 1.0), (-5, 0, 0), X)
 
 
+def _implicit():
+    def within(text):
+        return Implicit(text, (-2, -2, -2), (2, 2, 2))
+    ball = "x^2+y^2+z^2-1"
+    yield Case(within(f"({ball})^2"), (0, 0, -3), UP)
+    yield Case(within("1/x"), (-1, 0, 0), X)
+    for factor in ("10^300", "10^-300", "1"):
+        yield Case(within(f"{factor}*({ball})"), (0, 0.5, -5), UP)
+    # tanh(1e6 (z - 0.3))
+    yield Case(within("1-2/(exp(2e6*(z-0.3))+1)"), (0, 0, -1), UP)
+    yield Case(within("sqrt(x)-0.5"), (-1, 0, 0), X)
+    yield Case(within("sqrt(x)+0.5"), (-1, 0, 0), X)
+    yield Case(within(ball), (0, 1, -5), UP)
+    yield Case(within(ball), (0, 0.5, -1e8), UP)
+    yield Case(within(ball), (0.5e-4, 0.25, -3e4), UP, (TALL,))
+
+
 CATALOGUE: dict[type[Shape], tuple[Case, ...]] = {
     Sphere: tuple(_sphere()), Plane: tuple(_plane()), Triangle: tuple(_triangle()), Polygon: tuple(_polygon()), Box: tuple(_box()),
     Cylinder: tuple(_cylinder()), Cone: tuple(_cone()), Quadric: tuple(_quadric()), Torus: tuple(_torus()),
-    Polyhedron: tuple(_polyhedron()), Blob: tuple(_blob())}
+    Polyhedron: tuple(_polyhedron()), Blob: tuple(_blob()), Implicit: tuple(_implicit())}

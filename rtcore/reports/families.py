@@ -9,7 +9,7 @@ from rtcore.fields import FieldError
 from rtcore.reports.catalogue import CATALOGUE, Case
 from rtcore.reports.making import NEVER_THIN, edges, make
 from rtcore.scene import Node, Rotate, Scale, Scene, Shape, Shear, Translate
-from rtcore.shapes import Mesh, Polygon
+from rtcore.shapes import Implicit, Mesh, Polygon
 
 PER_SHAPE = 16      # rays before a new shape is thrown
 
@@ -191,7 +191,7 @@ def families(shape: type[Shape]) -> tuple[str, ...]:
     lacks = {"thin"} if shape in NEVER_THIN else set()
     if edges(sample) is None:
         lacks.add("edges")
-    if shape in (Mesh, Polygon):        # at a tie the half-open rule decides, or any of the faces
+    if shape in (Mesh, Polygon, Implicit):      # at a tie the half-open rule decides, or any of the faces; formulas have no numbers
         lacks.add("aligned")
     return (*(("catalogue",) if shape in CATALOGUE else ()), *(name for name in FAMILIES if name not in lacks))
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from rtcore.fields import FieldError
 from rtcore.scene import Shape
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 COMB = np.array([(-1, -0.7, 0), (1, -0.8, 0), (0.9, 0.75, 0), (0.4, -0.2, 0), (0.1, 0.8, 0), (-0.3, -0.1, 0), (-0.9, 0.7, 0)])
 TETRAHEDRON = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) * 0.6
@@ -100,9 +100,23 @@ def _blob(rng, size, thin):
     return Blob(tuple(elements), float(1 - 10 ** rng.uniform(-5, -2) if thin else rng.uniform(0.2, 0.7)))
 
 
+def _implicit(rng, size, thin):
+    """A sphere, a torus, a gyroid, a smooth union, a sextic of ours; thin ones are shells with a double root between their walls."""
+    x, y, z = (f"({name}/{size!r})" for name in "xyz")
+    square, a = f"({x}^2+{y}^2+{z}^2)", round(rng.uniform(0.2, 0.6), 6)
+    forms = (f"{square}-{a}", f"({square}+{a}-0.05)^2-{4 * a:.6f}*({x}^2+{y}^2)",
+             f"sin(4*{x})*cos(4*{y})+sin(4*{y})*cos(4*{z})+sin(4*{z})*cos(4*{x})-{a - 0.4:.6f}",
+             f"smin({square}-{a}, ({x}-0.7)^2+{y}^2+{z}^2-0.2, 0.3)", f"{x}^6+{y}^4*2+{z}^2-{x}*{y}*{z}-{a}")
+    text = forms[rng.integers(len(forms))]
+    if thin:
+        text = f"({square}-{a})^2-{10 ** rng.uniform(-12, -4):.3e}"
+    return Implicit(text, (-size,) * 3, (size,) * 3)
+
+
 MAKERS: dict[type[Shape], Callable] = {
     Sphere: _sphere, Plane: _plane, Triangle: _triangle, Mesh: _mesh, Polygon: _polygon, Box: _box, Cylinder: _cylinder, Cone: _cone,
-    Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron, Blob: _blob}
+    Quadric: _quadric, Torus: _torus, Polyhedron: _polyhedron, Blob: _blob,
+    Implicit: _implicit}
 
 #: Shapes that have nothing to be thin in.
 NEVER_THIN = (Sphere, Plane)

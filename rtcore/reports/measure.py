@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.api import intersect
+from rtcore.fields import FieldError
 from rtcore.flatten import DTYPES, flatten
 from rtcore.reports.condition import condition
 from rtcore.reports.families import Batch, batches
@@ -42,9 +43,22 @@ def truths(batch: Batch) -> list:
 
 
 def by_renderer(batch: Batch, precision: str) -> Answer:
+    """What the renderer says; a shape that it refuses has no finite answer."""
+    if refused(batch, precision):
+        n = len(batch.origins)
+        return Answer(np.full(n, np.nan), np.zeros(n, bool), np.ones(n, bool))
     hits = intersect(batch.scene, batch.origins, batch.directions, precision=precision, threads=1)
     hit = hits.node >= 0
     return Answer(hits.t, hit, hit & ~(np.isfinite(hits.t) & np.isfinite(hits.normal).all(axis=1)) | np.isnan(hits.t))
+
+
+def refused(batch: Batch, precision: str) -> bool:
+    """Whether the renderer takes a shape's numbers to be beyond the precision."""
+    try:
+        flatten(batch.scene, precision)
+    except FieldError:
+        return True
+    return False
 
 
 def own_space(batch: Batch) -> np.ndarray:
@@ -80,7 +94,8 @@ def measure(shape: type[Shape], family: str, precision: str, n: int, seed: int, 
         tally = _Tally(shape, name, precision, family)
         for batch, truth in zip(sets, true):
             tally.add(batch, truth, by_renderer(batch, precision) if name == RENDERER else by_solver(batch, name))
-        yield tally.row(min(_nanoseconds(batch, name, precision, timed) for batch in sets[:TIMED_BATCHES]) if sets else math.nan)
+        taken = [batch for batch in sets[:TIMED_BATCHES] if name != RENDERER or not refused(batch, precision)]
+        yield tally.row(min((_nanoseconds(batch, name, precision, timed) for batch in taken), default=math.nan))
 
 
 def _within(truth: list, dtype) -> list:

@@ -24,7 +24,7 @@ from rtcore.reports.families import families
 from rtcore.reports.page import page
 from rtcore.reports.rows import COLUMNS, POINT_COLUMNS, Row
 from rtcore.reports.targets import TARGETS
-from rtcore.shapes import Blob, Torus
+from rtcore.shapes import Blob, Implicit, Mesh, Torus
 
 SHAPES = {shape.__name__.lower(): shape for shape in TARGETS}
 MOST_WORKERS = 8
@@ -38,11 +38,12 @@ class Size(NamedTuple):
     timed: int
 
 
-QUICK, FULL = Size(40, 12_000, 512), Size(2048, 1_200_000, 4096)
+QUICK, FULL = Size(40, 12_000, 512), Size(1536, 1_000_000, 4096)
 #: The oracle's milliseconds for a ray, where it is slow; and the share of rays that are left for it.
-SLOW = {Torus: (6, 1 / 4), Blob: (14, 1 / 8)}
+SLOW = {Torus: (6, 1 / 4), Blob: (14, 1 / 8), Implicit: (5, 1 / 4)}
 RAY = 0.5           # milliseconds otherwise
 BRUTE = 1e-3        # milliseconds a ray without the oracle, shapes thrown among them
+MESH_FACTOR = 10    # times as many rays at the shared edges of meshes: 10⁷ in all, as those that leave the surfaces of all shapes
 
 
 class Progress(NamedTuple):
@@ -77,7 +78,9 @@ def jobs(shapes: Iterable[str] | None, quick: bool, seed: int) -> list[Job]:
         for precision in DTYPES:
             n = round(size.rays * share)
             found += [Job(name, precision, family, seed, n, size.timed, round(n * cost) + 50) for family in families(shape)]
-            found += [Job(name, precision, family, seed, size.brute, 0, round(size.brute * BRUTE) + 100) for family in brute(shape)]
+            for family in brute(shape):
+                n = size.brute * (MESH_FACTOR if shape is Mesh and family == "shared edges" else 1)
+                found.append(Job(name, precision, family, seed, n, 0, round(n * BRUTE) + 100))
     return sorted(found, key=lambda job: -job.cost)
 
 

@@ -2,7 +2,7 @@
 from typing import NamedTuple
 
 from rtcore.scene import Shape
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 #: Families whose rays are aimed at where a hit turns into a miss, within a rounding.
 BORDERLINE = ("edges", "grazing", "surface")
@@ -33,5 +33,5 @@ FLAT = Target({"f32": 1, "f64": 2}, 4, exact_hits=False)
 
 TARGETS: dict[type[Shape], Target] = {
     Sphere: QUADRATIC, Plane: QUADRATIC, Quadric: QUADRATIC, Cylinder: QUADRATIC, Cone: QUADRATIC,
-    Torus: Target({"f32": 4, "f64": 4}, 4), Blob: Target({"f32": 1, "f64": 2}, 8),
+    Torus: Target({"f32": 4, "f64": 4}, 4), Blob: Target({"f32": 1, "f64": 2}, 8), Implicit: Target({"f32": 1, "f64": 2}, 8),
     Triangle: FLAT, Mesh: FLAT, Polygon: FLAT, Box: FLAT, Polyhedron: FLAT}
