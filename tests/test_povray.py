@@ -1,5 +1,6 @@
 """Against POV-Ray: the same numbers give the same hits, but for pixels on the outline, where the last digit decides."""
 import itertools
+import re
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
@@ -9,7 +10,7 @@ import pytest
 from PIL import Image
 
 import rtcore
-from rtcore import Blob, Camera, Material, Node, Polyhedron, Quadric, Rotate, Scale, Scene, Shear, Torus, Translate
+from rtcore import Blob, Camera, Implicit, Material, Node, Polyhedron, Quadric, Rotate, Scale, Scene, Shear, Torus, Translate
 
 pytestmark = pytest.mark.skipif(shutil.which("povray") is None, reason="POV-Ray is not installed")
 
@@ -72,6 +73,14 @@ def cut_cube() -> Polyhedron:
     return Polyhedron(planes=[*axes, *corners])
 
 
+def isosurface(shape: Implicit) -> str:
+    function = re.sub(r"(\w)\^(\d)", r"pow(\1, \2)", shape.expression)
+    box = f"box {{ {vector(shape.low)}, {vector(shape.high)} }}"
+    return (f"isosurface {{ function {{ {function} }} threshold 0 contained_by {{ {box} }} accuracy 1e-8 max_gradient 40 "
+            "all_intersections open ")
+
+
+WIDE = {"low": (-1.2, -1.2, -1.2), "high": (1.2, 1.2, 1.2)}
 CASES = {
     "torus": (torus, Torus(major_radius=1.0, minor_radius=0.25)),
     "thin torus": (torus, Torus(major_radius=1.2, minor_radius=0.06)),
@@ -81,16 +90,9 @@ CASES = {
     "ellipsoid with all terms": (quadric, Quadric(coefficients=(1.1, 1.6, 0.9, 0.5, -0.3, 0.4, 0.1, -0.2, 0.15, -0.8))),
     "saddle": (quadric, Quadric(coefficients=(1, -1, 0, 0, 0, 0, 0, 0, -1, 0), low=(-1, -1, -0.6), high=(1, 1, 0.7))),
     "cube without corners": (polyhedron, cut_cube()),
+    "quartic with holes": (isosurface, Implicit(expression="x^4 + y^4 + z^4 - 1.1*(x^2 + y^2 + z^2) + 0.45", **WIDE)),
+    "waves": (isosurface, Implicit(expression="z - 0.3*sin(4*x)*cos(3*y)", **WIDE)),
 }
-if hasattr(rtcore, "Implicit"):
-    def isosurface(shape) -> str:
-        box = f"box {{ {vector(shape.low)}, {vector(shape.high)} }}"
-        return (f"isosurface {{ function {{ {shape.expression} }} threshold 0 contained_by {{ {box} }} accuracy 1e-8 max_gradient 40 "
-                "all_intersections open ")
-
-    WIDE = {"low": (-1.2, -1.2, -1.2), "high": (1.2, 1.2, 1.2)}
-    CASES["cube of holes"] = isosurface, rtcore.Implicit(expression="x^4 + y^4 + z^4 - 1.1*(x^2 + y^2 + z^2) + 0.45", **WIDE)
-    CASES["waves"] = isosurface, rtcore.Implicit(expression="z - 0.3*sin(4*x)*cos(3*y)", **WIDE)
 
 
 def our_mask(node: Node, camera: Camera, precision: str) -> np.ndarray:
