@@ -1,12 +1,14 @@
 """The stability report: what it measures is true, what it writes is whole, and a bad solver is caught."""
 import csv
 import math
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
-from commandline import ENVIRONMENT, one_line, run_here
+from commandline import ENVIRONMENT, one_line, process, run_here
 
 import rtcore
 from rtcore import Blob, Box, Cylinder, Implicit, Mesh, Plane, Polygon, Scale, Sphere, Torus, solvers
@@ -227,3 +229,15 @@ def test_without_qt_there_are_tables(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "app.plots", None)
     command._draw(tmp_path)
     assert "no plots, only tables" in capsys.readouterr().err
+
+
+def test_interrupted(tmp_path):
+    """Ctrl-C keeps what was measured so far."""
+    running = process("stability", "-o", tmp_path, "--quick")
+    time.sleep(8)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert (running.returncode, out) == (130, "") and "interrupted" in err and "Traceback" not in err
+    assert ("holds what was measured so far" in err) == (tmp_path / "stability.csv").exists()
+    if (tmp_path / "stability.csv").exists():
+        assert "Interrupted: only a part of it was measured." in (tmp_path / "stability.md").read_text()

@@ -53,10 +53,10 @@ def run(args, parser: Parser) -> int:
         stability.write(rows, folder, "Interrupted: only a part of it was measured." if stopped else "")
     except WriteError as error:
         raise Refused(error, 1) from None
-    _draw(folder)
     if stopped:
         say(f"interrupted; {folder} holds what was measured so far")
         return 130
+    _draw(folder)
     missed = stability.misses(stability.in_order(rows))
     for line in missed:
         say(f"misses its target: {line}")

@@ -1,4 +1,5 @@
 """Families that need no oracle, only many rays: at shared edges, leaving surfaces, across narrow gaps, any hit against the closest."""
+import functools
 import math
 from collections.abc import Callable
 
@@ -62,31 +63,29 @@ def any_hit(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
 
 # --- shared edges ---
 
-def closed_meshes(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
-    """From inside closed meshes at their vertices and edges: every ray hits."""
+def closed_mesh(name: str, shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
+    """From inside a closed mesh at its vertices and edges: every ray hits."""
     rng, dtype = np.random.default_rng([seed, 1]), DTYPES[precision]
-    rays = wrong = 0
-    worst = None
-    for name, ((vertices, faces), room, share) in MESHES.items():
-        mesh = Mesh(vertices.astype(dtype).astype(float), faces)
-        scene = Scene(objects=[mesh])
-        for start in range(0, int(n * share), CHUNK):
-            size = min(CHUNK, int(n * share) - start)
-            corners = mesh.vertices[mesh.faces[rng.integers(0, len(faces), size)]]
-            first = rng.integers(0, 3, size)
-            a, b = corners[np.arange(size), first], corners[np.arange(size), (first + 1) % 3]
-            along = rng.choice([0, 0.5, 0.25, 2], (size, 1), p=[0.4, 0.1, 0.1, 0.4])
-            target = a + np.where(along > 1, rng.random((size, 1)), along) * (b - a)
-            eye = rng.uniform(-room, room, (size, 3))
-            eye[::2] = rng.uniform(-room, room, 3)      # half of the rays from one point, as a camera's are
-            eye = eye.astype(dtype).astype(float)
-            lost = ~np.isfinite(intersect(scene, eye, target - eye, precision=precision, threads=1).t)
-            rays, wrong = rays + size, wrong + int(lost.sum())
-            if lost.any() and worst is None:
-                i = int(lost.argmax())
-                code = example(f"Mesh(*MESHES[{name!r}][0])", (), eye[i], (target - eye)[i], precision)
-                worst = Worst(True, math.inf, "a ray gets out of a closed mesh", code)
-    return [_row(shape, precision, "shared edges", rays, wrong, worst)]
+    (vertices, faces), room, share = MESHES[name]
+    mesh, n = Mesh(vertices.astype(dtype).astype(float), faces), round(n * share)
+    wrong, worst = 0, None
+    for start in range(0, n, CHUNK):
+        size = min(CHUNK, n - start)
+        corners = mesh.vertices[mesh.faces[rng.integers(0, len(faces), size)]]
+        first = rng.integers(0, 3, size)
+        a, b = corners[np.arange(size), first], corners[np.arange(size), (first + 1) % 3]
+        along = rng.choice([0, 0.5, 0.25, 2], (size, 1), p=[0.4, 0.1, 0.1, 0.4])
+        target = a + np.where(along > 1, rng.random((size, 1)), along) * (b - a)
+        eye = rng.uniform(-room, room, (size, 3))
+        eye[::2] = rng.uniform(-room, room, 3)      # half of the rays from one point, as a camera's are
+        eye = eye.astype(dtype).astype(float)
+        lost = ~np.isfinite(intersect(Scene(objects=[mesh]), eye, target - eye, precision=precision, threads=1).t)
+        wrong += int(lost.sum())
+        if lost.any() and worst is None:
+            i = int(lost.argmax())
+            code = example(f"Mesh(*MESHES[{name!r}][0])", (), eye[i], (target - eye)[i], precision)
+            worst = Worst(True, math.inf, "a ray gets out of a closed mesh", code)
+    return [_row(shape, precision, f"shared edges: {name}", n, wrong, worst)]
 
 
 def shared_edge(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
@@ -220,8 +219,10 @@ def gap(shape: type[Shape], precision: str, n: int, seed: int) -> list[Row]:
 def brute(shape: type[Shape]) -> dict[str, Callable]:
     """The families of this page that a shape has: (shape, precision, rays, seed) -> rows."""
     work = {"any-hit": any_hit}
-    if shape in (Mesh, Triangle):
-        work["shared edges"] = closed_meshes if shape is Mesh else shared_edge
+    if shape is Triangle:
+        work["shared edges"] = shared_edge
+    if shape is Mesh:
+        work |= {f"shared edges: {name}": functools.partial(closed_mesh, name) for name in MESHES}
     if shape in MODELS:
         work |= {"leaving": leaving, "gap": gap}
     return work

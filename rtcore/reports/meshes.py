@@ -52,4 +52,4 @@ def lattice(n: int = 24) -> tuple[np.ndarray, np.ndarray]:
 
 
 #: Name -> the mesh, how far from the middle an eye may be and still be inside, and its share of the rays.
-MESHES = {"ball": (ball(), 0.3, 0.4), "lattice": (lattice(), 0.3, 0.35), "tube": (tube(), 0.005, 0.2), "fan": (fan(), 0.3, 0.05)}
+MESHES = {"ball": (ball(), 0.3, 0.4), "lattice": (lattice(), 0.3, 0.4), "tube": (tube(), 0.005, 0.18), "fan": (fan(), 0.3, 0.02)}

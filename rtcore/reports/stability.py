@@ -24,7 +24,7 @@ from rtcore.reports.families import families
 from rtcore.reports.page import page
 from rtcore.reports.rows import COLUMNS, POINT_COLUMNS, Row
 from rtcore.reports.targets import TARGETS
-from rtcore.shapes import Blob, Implicit, Mesh, Torus
+from rtcore.shapes import Blob, Implicit, Torus
 
 SHAPES = {shape.__name__.lower(): shape for shape in TARGETS}
 MOST_WORKERS = 8
@@ -79,7 +79,7 @@ def jobs(shapes: Iterable[str] | None, quick: bool, seed: int) -> list[Job]:
             n = round(size.rays * share)
             found += [Job(name, precision, family, seed, n, size.timed, round(n * cost) + 50) for family in families(shape)]
             for family in brute(shape):
-                n = size.brute * (MESH_FACTOR if shape is Mesh and family == "shared edges" else 1)
+                n = size.brute * (MESH_FACTOR if family.startswith("shared edges:") else 1)
                 found.append(Job(name, precision, family, seed, n, 0, round(n * BRUTE) + 100))
     return sorted(found, key=lambda job: -job.cost)
 
@@ -193,11 +193,13 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--shape", choices=SHAPES)
     parser.add_argument("--quick", action="store_true")
     args = parser.parse_args(argv)
-    rows = []
+    rows, told = [], -1
     try:
         for step in run([args.shape] if args.shape else None, args.quick):
             rows += step.rows
-            print(step.done, step.total, step.what, flush=True)
+            if step.done > told:
+                print(step.done, step.total, step.what, flush=True)
+            told = step.done
         write(rows, args.folder)
     except (ModuleNotFoundError, WriteError) as error:
         print(f"rtcore.reports.stability: {error}", file=sys.stderr)
