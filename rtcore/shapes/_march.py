@@ -32,7 +32,9 @@ class Search(NamedTuple):
     at: np.ndarray          # (AT_ROWS, 8): pieces
     point: np.ndarray       # (AT_ROWS, 8): points
     state: np.ndarray       # (STATE_ROWS, 8)
-    probe: np.ndarray       # (STATE_ROWS, 8): as state, of eight places on one ray
+    probe: np.ndarray       # as state, at and point, of eight places on one ray
+    probe_at: np.ndarray
+    probe_point: np.ndarray
     whose: np.ndarray       # int64 (8): the ray of each lane, -1 none
     verdict: np.ndarray     # (4): what `settle` says
 
@@ -40,7 +42,7 @@ class Search(NamedTuple):
 @kernel
 def new_search():
     return Search(new_registers(), np.zeros((AT_ROWS, 8)), np.zeros((AT_ROWS, 8)), np.zeros((STATE_ROWS, 8)), np.zeros((STATE_ROWS, 8)),
-                  np.full(8, -1), np.zeros(4))
+                  np.zeros((AT_ROWS, 8)), np.zeros((AT_ROWS, 8)), np.full(8, -1), np.zeros(4))
 
 
 @inline
@@ -79,7 +81,7 @@ def begin_at(state, k, a, f, step):
 @inline
 def bisect(code, search, low, high, sign, row):
     """Where the value (row VALUE) or the slope (SLOPE) takes the given sign between low and high, to the last digit: by ninths."""
-    probe, point = search.probe, search.point
+    probe, point = search.probe, search.probe_point
     for _ in range(20):
         width = (high - low) / 9
         for j in range(8):
@@ -100,7 +102,8 @@ def bisect(code, search, low, high, sign, row):
 def settle(code, search, k):
     """What there is at the piece of lane k, which can't be cut further. Writes into search.verdict: whether there is a hit (1) or the
     search goes on (0), where, the value there if its sign is known, and the sign of the slope (0 of a touch)."""
-    state, probe, point, at, out = search.state, search.probe, search.point, search.at, search.verdict
+    state, probe, out = search.state, search.probe, search.verdict
+    at, point = search.probe_at, search.probe_point
     a, width, f = state[A, k], state[B, k] - state[A, k], state[AT_A, k]
     for j in range(8):
         for row in range(RAY_ROWS):
@@ -186,7 +189,7 @@ def enclose(search, k):
         return True
     if slow:
         state[POINT, k] = middle(na, nb)
-    return False
+    return not na < state[POINT, k] < nb
 
 
 @kernel
@@ -235,7 +238,8 @@ def march(code, search, rays, n, side, single, found, doubt, roots):
                     if monotone:
                         passed, share = f1 != 0, 0.6
                     elif f != 0 and f1 != 0 and alike:
-                        share = (f / -d + f1 / d1) / h if f > 0 else (f / -d1 + f1 / d) / h
+                        fall, rise = (abs(d), abs(d1)) if f > 0 else (abs(d1), abs(d))
+                        share = (abs(f) / fall + abs(f1) / rise) / h
                         passed = share > 1 + 1e-12
                 if passed:
                     if b >= state[END, k]:

@@ -134,7 +134,7 @@ def bring(rays, i, exact, q, local, m):
         store(local, WAY + k, m, way)
     store(local, BEGIN, m, enter)
     store(local, END, m, leave)
-    store(local, FLOOR, m, most * 2.0 ** -50 / fast)
+    store(local, FLOOR, m, most * 2.0 ** -49 / fast)
     store(local, T0, m, t0)
     store(local, FIRST, m, start)
     store(local, FAR, m, far)
