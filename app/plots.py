@@ -39,7 +39,7 @@ ON_DARK = ("#56b4e9", "#e8833a", "#2cc79a", "#e08fc0", "#e6c229", "#d0d0d0", "#8
 
 class Style(NamedTuple):
     """How a figure looks: its paper and inks, the size of its letters in pixels; a line of them as a share of a plot's height, and a letter
-    as a share of a figure's width."""
+    as a share of a figure's width; whether it has a title."""
 
     paper: str
     ink: str
@@ -48,6 +48,7 @@ class Style(NamedTuple):
     letters: int
     line: float
     letter: float
+    titled: bool
 
     def color(self, number: int) -> str:
         """The colour of the curve of that number."""
@@ -59,12 +60,12 @@ class Style(NamedTuple):
         return share / (1 - share)
 
 
-PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21, 0.05, 0.009)
+PRINTED = Style("#ffffff", "#222222", "#666666", ON_LIGHT, 21, 0.05, 0.009, True)
 
 
 def on_screen(theme: Theme) -> Style:
-    """The style of a figure within the window."""
-    return Style(theme.panel, theme.text, theme.muted, ON_DARK if theme.name == "dark" else ON_LIGHT, 12, 0.11, 0.0065)
+    """The style of a figure within the window, where tab and panel say what it is."""
+    return Style(theme.panel, theme.text, theme.muted, ON_DARK if theme.name == "dark" else ON_LIGHT, 12, 0.09, 0.0065, False)
 
 
 class Decades(pg.AxisItem):
@@ -88,7 +89,7 @@ class Decades(pg.AxisItem):
     def tickStrings(self, values, scale, spacing):
         if spacing < 1:
             return [""] * len(values)
-        if all(value == round(value) for value in values) and len(values) > 2:
+        if all(value == round(value) for value in values):
             return ["10" + str(round(value)).translate(RAISED) for value in values]
         return [f"{10 ** value:,.6g}" for value in values]
 
@@ -105,7 +106,8 @@ class Figure(pg.GraphicsLayoutWidget):
         letters = style.letters
         self.ci.layout.setContentsMargins(letters, letters * 0.7, letters, letters * 0.7)
         self.ci.layout.setSpacing(letters * 0.4)
-        self.addLabel(title, row=0, col=0, colspan=2, size=f"{round(letters * 1.35)}px", color=style.ink, bold=True, justify="left")
+        if style.titled:
+            self.addLabel(title, row=0, col=0, colspan=2, size=f"{round(letters * 1.35)}px", color=style.ink, bold=True, justify="left")
         self.addLabel(reading, row=1, col=0, colspan=2, size=f"{round(letters * 0.9)}px", color=style.faint, justify="left")
 
     def panel(self, column: int, title: str, bottom: str, left: str) -> pg.PlotItem:

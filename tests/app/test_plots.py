@@ -113,6 +113,8 @@ def test_axes_have_powers_of_ten(qapp):
     (_, labelled), (_, between) = axis.tickValues(-1.3, 7.2, 900)
     assert labelled == [-1, 0, 1, 2, 3, 4, 5, 6, 7] and any(abs(x - math.log10(2)) < 1e-9 for x in between)
     assert axis.tickStrings([-1.0, 0.0, 12.0], 1, 1) == ["10⁻¹", "10⁰", "10¹²"]
+    (_, labelled), _ = axis.tickValues(1.6, 2.8, 900)
+    assert axis.tickStrings(labelled, 1, 1) == ["50", "100", "200", "500"] and axis.tickStrings([0.0, 8.0], 1, 1) == ["10⁰", "10⁸"]
     (_, labelled), _ = axis.tickValues(-12, 12, 300)
     assert 3 <= len(labelled) <= 7
 
