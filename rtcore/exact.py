@@ -20,8 +20,8 @@ def parts(values: Iterable[Fraction | float], count: int = 2) -> list[float]:
 
 
 def rationals(values) -> list[Fraction]:
-    """Floats as rationals."""
-    return [Fraction(float(x)) for x in values]
+    """Floats, or rationals, as rationals."""
+    return [Fraction(x) for x in values]
 
 
 def dot(a, b) -> Fraction:
@@ -44,6 +44,16 @@ def _inverse(linear: bytes) -> tuple[tuple[Fraction, ...], ...]:
                 (d * h - e * g, b * g - a * h, a * e - b * d))
     whole = a * adjugate[0][0] + b * adjugate[1][0] + c * adjugate[2][0]
     return tuple(tuple(Fraction(x * unit, whole) for x in row) for row in adjugate)
+
+
+def inverse_parts(matrix: np.ndarray) -> np.ndarray:
+    """The inverse of the linear part of a 4 x 4 matrix in three parts: (27,), the rows' leading parts first. Not to be written to."""
+    return _inverse_parts(np.ascontiguousarray(matrix[:3, :3], np.float64).tobytes())
+
+
+@functools.lru_cache(maxsize=4096)
+def _inverse_parts(linear: bytes) -> np.ndarray:
+    return np.array(parts([x for row in _inverse(linear) for x in row], 3))
 
 
 def moved(matrix: np.ndarray, point) -> list[Fraction]:

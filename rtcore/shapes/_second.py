@@ -1,16 +1,16 @@
 """The ray and a surface of second degree, with a certain answer, in the manner of `_ball.py`.
 
-The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers at most about 1, in a unit space that the exact matrix L leads
-to; a box there, or the whole space, says which of its points belong to the surface. Along a ray about its closest approach to the unit
-space's origin it is a s² + 2 b s + c.
+The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers at most about 1, in a unit space that the exact matrix L
+leads to; a box there, a slab, or the whole space says which of its points belong to the surface. Along a ray about its closest approach
+to the unit space's origin it is a s² + 2 b s + c.
 
-Columns of Table.exact: three parts each of the centre, of L by rows, of the ten numbers; then two parts of the box's corners.
+Columns of Table.exact: three parts each of the centre, of L by rows, of the ten numbers; then two parts of the box's corners, or of the
+slab's vector e: it is what has |e·p| <= 1/2.
 """
 from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.exact import parts
 from rtcore.expansions import LONG, expand, put_products, solve_quadratic
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
@@ -20,12 +20,8 @@ from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import DX, OX, SLOW, START, T, record_one
 
 CENTER, INTO, FORM, BOX = 0, 9, 36, 66
+EVERYWHERE, IN_BOX, IN_SLAB = 0, 1, 2
 GONE = 2.0 ** 14    # how far a bound must be surpassed for plain arithmetic to be a good start
-
-
-def exact_row(center, into, form, box) -> list[float]:
-    """A row of Table.exact from rationals: centre (3), L (9), the form's numbers (10), the box's corners (6)."""
-    return [*parts(center, 3), *parts(into, 3), *parts(form, 3), *parts(box)]
 
 
 class Near(NamedTuple):
@@ -108,6 +104,13 @@ def may_meet(near):
     return ~(near.off < -near.fuzz)
 
 
+@inline
+def between(p, e, margin):
+    """Lanes whose point is surely in the slab of vector e, and those where it may be."""
+    height, margin = size(dot(p, e)), margin * extent(e)
+    return height <= 0.5 - margin, height <= 0.5 + margin
+
+
 class Form(NamedTuple):
     """The form's numbers, each a pair of lanes: of x² y² z², xy xz yz, x y z, and 1."""
 
@@ -176,14 +179,16 @@ def within(p, low, high, margin):
 
 
 @inline
-def choose(todo, near, m, f, f1, v, v1, far, low, high, bounded, start, end, side):
-    """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. No array may come in here,
-    see `_ball.choose`."""
+def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side):
+    """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. part: which part of the
+    form belongs to it, low and high being the box's corners, or low the slab's vector; none of it is further than `limit` from the origin.
+    No array may come in here, see `_ball.choose`."""
     w = -(near.b + with_sign(root(near.off), near.b))
     s0, s1 = w / near.a, near.c / w
     lead = size(near.a) + near.blur
-    # the root w/a lies beyond the box, or nowhere as a is 0
-    gone = (lead <= 0) | (lead * (near.reach + 2) < size(w) * root(dot(v, v))) if bounded else lead <= 0
+    gone = lead <= 0        # the root w/a is nowhere as a is 0, or lies beyond the limit
+    if part != EVERYWHERE:
+        gone = gone | (lead * (near.reach + limit) < size(w) * root(dot(v, v)))
     sure = (near.off > GONE * near.fuzz) & (gone | (size(near.a) > GONE * near.blur))
     unsure = todo & ~sure
     todo = todo & sure
@@ -200,8 +205,11 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, bounded, start, end, sid
             steep = size(slope)
             ok = certain(r, steep, left, start, end)
             hit = want & ok & (r > start) & (r < end)
-            if bounded:
-                inside, maybe = within(p, low, high, 8 * U64 * (2 + near.reach) + near.speed * (left / steep + 2 * U64 * size(r)))
+            if part != EVERYWHERE:
+                margin = 8 * U64 * (limit + near.reach) + near.speed * (left / steep + 2 * U64 * size(r))
+                inside, maybe = within(p, low, high, margin)
+                if part == IN_SLAB:
+                    inside, maybe = between(p, low, margin)
                 ok = ok & (inside | ~maybe)
                 hit = hit & inside
             if side & FRONT:
@@ -217,7 +225,7 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, bounded, start, end, sid
 
 
 @inline
-def meet(ray, i, exact, q, most, bounded, todo, near, side):
+def meet(ray, i, exact, q, most, part, limit, todo, near, side):
     """`choose` for surface q; t in the rays' precision."""
     o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, CENTER)
     x, x1 = two_sum(o.x, -c.x)
@@ -228,7 +236,7 @@ def meet(ray, i, exact, q, most, bounded, todo, near, side):
     v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
     end = load(ray, T, i)
     t, found, unsure = choose(todo, near, form_of(exact, q, zero), f, f1, v, v1, near.far + most * extent(c), splat3(exact, q, BOX),
-                              splat3(exact, q, BOX + 3), bounded, wide(load(ray, START, i)), wide(end), side)
+                              splat3(exact, q, BOX + 3), part, limit, wide(load(ray, START, i)), wide(end), side)
     return rounded(t, end), found, unsure
 
 
@@ -269,16 +277,13 @@ def second_parts(exact, q, v, out):
 
 
 @kernel
-def settle(rays, i, p, table, q, bounded, opacity):
-    """Ray i against surface q, the slow and certain way."""
+def line_form(exact, q, f, d, form):
+    """Expansions of a, b, c of the form along f + s d: form[0], form[1], form[2]."""
     out_of_line()
-    rays.tally[SLOW] += 1
-    exact, ray, side = table.exact, rays.ray, table.side[q]
-    f, d, mf, md = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG))
-    ray_parts(ray, i, exact, q, f, d)
+    mf, md = np.empty((3, LONG)), np.empty((3, LONG))
     second_parts(exact, q, f, mf)
     second_parts(exact, q, d, md)
-    terms, form, roots = np.empty(6 * LONG * LONG + 18 * LONG + 3 + LONG), np.empty((3, LONG)), np.empty((2, 2))
+    terms = np.empty(6 * LONG * LONG + 18 * LONG + 3 + LONG)
     n = 0
     for k in range(3):
         n = put_products(terms, n, 1.0, md[k], d[k])
@@ -296,15 +301,29 @@ def settle(rays, i, p, table, q, bounded, opacity):
         n = put_products(terms, n, 1.0, (exact[q, a], exact[q, a + 10], exact[q, a + 20]), f[k])
     terms[n], terms[n + 1], terms[n + 2] = exact[q, FORM + 9], exact[q, FORM + 19], exact[q, FORM + 29]
     expand(terms, n + 3, form[2])
+
+
+@kernel
+def settle(rays, i, p, table, q, part, opacity):
+    """Ray i against surface q, the slow and certain way."""
+    out_of_line()
+    rays.tally[SLOW] += 1
+    exact, ray, side = table.exact, rays.ray, table.side[q]
+    f, d, form, roots = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((2, 2))
+    ray_parts(ray, i, exact, q, f, d)
+    line_form(exact, q, f, d, form)
     slope = solve_quadratic(form[0], form[1], form[2], roots)
     first = 0 if roots[0, 0] <= roots[1, 0] else 1
     for k in range(2):
         j = first if k == 0 else 1 - first
         falls = slope < 0 if j == 0 else slope > 0
         rises = slope > 0 if j == 0 else slope < 0
-        if (side & FRONT and not falls) or (side & BACK and not rises):
+        if (side & FRONT and not falls) or (side & BACK and not rises) or not ray[START, i] < roots[j, 0] <= ray[T, i]:
             continue
-        if abs(roots[j, 0]) < np.inf and (not bounded or in_box(exact, q, f, d, roots[j])) and ray[START, i] < roots[j, 0] <= ray[T, i]:
+        if not abs(roots[j, 0]) < np.inf:
+            continue
+        if (part == EVERYWHERE or (part == IN_BOX and in_box(exact, q, f, d, roots[j]))
+                or (part == IN_SLAB and in_slab(exact, q, f, d, roots[j]))):
             record_one(rays, i, p, roots[j, 0], opacity)
             return
 
@@ -327,4 +346,33 @@ def in_box(exact, q, f, d, t):
             beyond = -over[0] if end == 0 else over[0]
             if beyond > 2.0 ** -98 * (abs(f[k, 0]) + abs(t[0] * d[k, 0])):
                 return False
+    return True
+
+
+@kernel
+def heights(exact, q, v, out):
+    """e·v as an expansion, e being the slab's vector, v expansions (3, LONG)."""
+    out_of_line()
+    terms, n = np.empty(12 * LONG + LONG), 0
+    for k in range(3):
+        n = put_products(terms, n, 1.0, (exact[q, BOX + k], exact[q, BOX + 6 + k]), v[k])
+    expand(terms, n, out)
+
+
+@kernel
+def in_slab(exact, q, f, d, t):
+    """Whether the point f + t d of the unit space, in expansions, t a pair, is in the slab of surface q, its sides included."""
+    out_of_line()
+    terms, low, speed, over = np.empty(5 * LONG + 1 + LONG), np.empty(LONG), np.empty(LONG), np.empty(LONG)
+    heights(exact, q, f, low)
+    heights(exact, q, d, speed)
+    for end in range(2):
+        sign = 2.0 * end - 1
+        for j in range(LONG):
+            terms[j] = sign * low[j]
+        n = put_products(terms, LONG, sign, t, speed)
+        terms[n] = -0.5
+        expand(terms, n + 1, over)
+        if over[0] > 2.0 ** -98 * (abs(low[0]) + abs(t[0] * speed[0])):
+            return False
     return True

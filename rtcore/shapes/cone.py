@@ -1,21 +1,30 @@
 """Cylinder and Cone: one kind, the frustum x² + y² = (base + slope·z)² over z = 0 .. 1, placed by a matrix.
 
-The quadratic is taken about the ray's closest approach to the frustum's middle, so a far eye costs no digits; roots by the
-lecture's stable pair. A ray along a generator or through the apex has A = 0: then one root is infinite and fails the height test.
+What the rays meet is the exact form of second degree that the author's numbers say, |p|² - (A·p)²/A·A = (r + k A·p)² about the middle of
+the axis A, in the author's own space, by `_second.py`; the caps are planes on which the form is at most 0. A ray along a generator or
+through the apex has A = 0: then one root is infinite and drops out.
 """
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import inverse_parts, moved, parts, rationals
+from rtcore.expansions import LONG, expand, put_products
 from rtcore.fields import FieldError, Flag, Number, Vec, Vector
-from rtcore.jit import inline, kernel
-from rtcore.lanes import along, dot, load, load3, root, select, splat3, vec3, with_sign
+from rtcore.jit import inline, kernel, out_of_line
+from rtcore.lanes import along, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
+from rtcore.pairs import add, divide, multiply, square, two_sum
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, around, forward, into, placed, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, record
+from rtcore.shapes import _second
+from rtcore.shapes._ball import U64, advance, extent, lowest
+from rtcore.shapes._second import BOX, CENTER, FORM, IN_SLAB, INTO, approach, form_of, heights, into_pairs, line_form, may_meet, ray_parts
+from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, around, forward, placed, put_placed, unit_hit
+from rtcore.wave import DX, OX, SLOW, START, T, record, record_one
 
-BASE, SLOPE, CAPPED = OWN, OWN + 1, OWN + 2
+#: Columns after the placing: radius at z = 0 and what it grows by; whether there are caps below and above; the largest number of L, that of
+#: the form's second-degree part, how far the frustum reaches from its middle in the form's units.
+BASE, SLOPE, LOWER, UPPER, MOST, CURVED, LIMIT = range(OWN, OWN + 7)
 
 
 class Cylinder(Shape, frozen=True):
@@ -60,8 +69,9 @@ class Cone(Shape, frozen=True):
 
 
 def frustum(base, base_radius, apex, apex_radius, capped, matrix) -> Packed:
-    """The frustum with its greater radius scaled to 1, its axis to z and its height to 1."""
-    base, axis = np.array(base), np.subtract(apex, base)
+    """The frustum with its greater radius scaled to 1, its axis to z and its height to 1; and its exact form."""
+    base, apex = np.array(base), np.array(apex)
+    axis = apex - base
     length = np.abs(axis).max()
     z = axis / length / np.linalg.norm(axis / length)
     x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
@@ -71,43 +81,143 @@ def frustum(base, base_radius, apex, apex_radius, capped, matrix) -> Packed:
     unit[:3, :3] = np.stack([x * most, np.cross(z, x) * most, axis], axis=1)
     unit[:3, 3] = base
     local = matrix @ unit
-    return Packed(CONE, placed(local, invertible(local), base_radius / most, (apex_radius - base_radius) / most, float(capped))[None])
+    back = invertible(local)
+    power = float(np.ldexp(1.0, np.frexp(most)[1]))     # the form's unit of length
+    exact = np.zeros(78)
+    exact_frustum(base, apex, base_radius, apex_radius, power, exact)
+    if np.array_equal(matrix, np.eye(4)):
+        exact[INTO:INTO + 9] = np.eye(3).ravel() / power
+    else:
+        middle = [(p + q) / 2 for p, q in zip(rationals(base), rationals(apex))]
+        exact[CENTER:INTO] = parts(moved(matrix, middle), 3)
+        exact[INTO:FORM] = inverse_parts(matrix) / power
+    numbers = (base_radius / most, (apex_radius - base_radius) / most, float(capped and base_radius > 0), float(capped and apex_radius > 0),
+               np.abs(exact[INTO:INTO + 9]).max(), np.abs(exact[FORM:FORM + 6]).max(), np.linalg.norm(axis / power) / 2 + 2)
+    return Packed(CONE, placed(local, back, *numbers)[None], exact=exact[None])
+
+
+@kernel
+def exact_frustum(base, apex, base_radius, apex_radius, power, out):
+    """Into a row of Table.exact: the middle as pairs; the form |p|² - K (e·p)² - 2 r g e·p - r², lengths over `power`, in pairs, where
+    e·p is -1/2 .. 1/2 between the ends, r the radius in the middle, g what it grows by, K = A·A + g²; the slab's vector e = A / A·A."""
+    axis, e, whole, whole1 = np.empty((3, 2)), np.empty((3, 2)), 0.0, 0.0
+    for k in range(3):
+        out[CENTER + k], out[CENTER + 3 + k] = two_sum(0.5 * base[k], 0.5 * apex[k])
+        axis[k, 0], axis[k, 1] = two_sum(apex[k] / power, -base[k] / power)
+        part, part1 = square(axis[k, 0], axis[k, 1])
+        whole, whole1 = add(whole, whole1, part, part1)
+    for k in range(3):
+        e[k, 0], e[k, 1] = divide(axis[k, 0], axis[k, 1], whole, whole1)
+        out[BOX + k], out[BOX + 6 + k] = e[k, 0], e[k, 1]
+    r, r1 = two_sum(0.5 * base_radius / power, 0.5 * apex_radius / power)
+    g, g1 = two_sum(apex_radius / power, -base_radius / power)
+    gg, gg1 = square(g, g1)
+    curl, curl1 = add(whole, whole1, gg, gg1)
+    for k in range(3):
+        p, p1 = multiply(curl, curl1, e[k, 0], e[k, 1])
+        s, s1 = multiply(p, p1, e[k, 0], e[k, 1])
+        out[FORM + k], out[FORM + 10 + k] = add(1.0, 0.0, -s, -s1)
+        for j in range(k + 1, 3):
+            s, s1 = multiply(p, p1, -2 * e[j, 0], -2 * e[j, 1])
+            out[FORM + 2 + k + j], out[FORM + 12 + k + j] = s, s1
+        s, s1 = multiply(r, r1, g, g1)
+        s, s1 = multiply(-2 * s, -2 * s1, e[k, 0], e[k, 1])
+        out[FORM + 6 + k], out[FORM + 16 + k] = s, s1
+    s, s1 = square(r, r1)
+    out[FORM + 9], out[FORM + 19] = -s, -s1
 
 
 @inline
-def hit_frustum(rays, i, p, o, d, base, slope, capped, side, opacity):
-    """Eight rays against the frustum. o, d: Vec3 of lanes in its unit space."""
-    start = load(rays.ray, START, i)
-    centre = vec3(o.x, o.y, o.z - 0.5)
-    shift = -dot(centre, d) / dot(d, d)
-    near = along(o, shift, d)
-    radius = base + slope * near.z
-    a = d.x * d.x + d.y * d.y - slope * slope * d.z * d.z
-    b = near.x * d.x + near.y * d.y - slope * d.z * radius
-    c = near.x * near.x + near.y * near.y - radius * radius
-    q = -(b + with_sign(root(b * b - a * c), b))
-    s0, s1 = q / a, c / q
-    far = 0 * shift + np.inf
-    for k in range(2):
-        s = s0 if k == 0 else s1
-        z = near.z + s * d.z
-        t = s + shift
-        ok = (z >= 0) & (z <= 1) & (t > start)
-        if side != 0:
-            facing = (near.x + s * d.x) * d.x + (near.y + s * d.y) * d.y - slope * (base + slope * z) * d.z
-            ok = ok & (facing < 0) if side & FRONT else ok & (facing > 0)
-        far = select(ok & (t < far), t, far)
-    if capped:
-        for k in range(2):
-            s = (k - near.z) / d.z
-            x, y, r = near.x + s * d.x, near.y + s * d.y, base + slope * k
-            t = s + shift
-            ok = (x * x + y * y <= r * r) & (t > start)
-            if side != 0:
-                outward = d.z * (2 * k - 1)
-                ok = ok & (outward < 0) if side & FRONT else ok & (outward > 0)
-            far = select(ok & (t < far), t, far)
-    record(rays, i, p, far, far < np.inf, opacity)
+def near_cap(ray, i, exact, q, near, end):
+    """Of eight rays, plainly: those that may cross the plane of the cap at e·p = end, a number, where the frustum is."""
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, CENTER)) - splat3(exact, q, CENTER + 3), wide(load3(ray, DX, i))
+    f, d, e = _second.times(exact, q, g), _second.times(exact, q, v), splat3(exact, q, BOX)
+    rise = dot(e, d)
+    t = (end - dot(e, f)) / rise
+    p = along(f, t, d)
+    pull, mixed, slope = splat3(exact, q, FORM), splat3(exact, q, FORM + 3), splat3(exact, q, FORM + 6)
+    form = 0.5 * dot(_second.steepness(pull, mixed, p), p) + dot(slope, p) + exact[q, FORM + 9]
+    grow = 1 + extent(p)
+    slack = 32 * U64 * (extent(e) * near.far / size(rise) + size(t))
+    out = form > 64 * U64 * (near.far + 1) * grow + 4 * grow * near.speed * slack
+    return ~(out | (t + slack < wide(load(ray, START, i))) | (t - slack > wide(load(ray, T, i))))
+
+
+@inline
+def meet_cap(ray, i, exact, q, most, end, todo, near, side):
+    """Where the lanes `todo` cross the cap at e·p = end: t in the rays' precision, the lanes that do, the uncertain ones."""
+    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, CENTER)
+    x, x1 = two_sum(o.x, -c.x)
+    y, y1 = two_sum(o.y, -c.y)
+    z, z1 = two_sum(o.z, -c.z)
+    zero = 0 * x
+    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, CENTER + 3))
+    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
+    e, e1 = splat3(exact, q, BOX), splat3(exact, q, BOX + 6)
+    h, h1 = height(e, e1, f, f1)
+    w, w1 = height(e, e1, v, v1)
+    h, h1 = add(end + zero, zero, -h, -h1)
+    t, _ = divide(h, h1, w, w1)
+    m = form_of(exact, q, zero)
+    x, x1 = advance(f.x, f1.x, t, v.x, v1.x)
+    y, y1 = advance(f.y, f1.y, t, v.y, v1.y)
+    z, z1 = advance(f.z, f1.z, t, v.z, v1.z)
+    form = _second.value(m, x, x1, y, y1, z, z1)
+    grow = 1 + extent(vec3(x, y, z))
+    blur = 64 * U64 * U64 * extent(e)
+    far = near.far + most * extent(c) + 1
+    left = blur * (far + near.speed * size(t)) / size(w)
+    first, last = wide(load(ray, START, i)), wide(load(ray, T, i))
+    outside = (t + left < first) | (t - left > last)
+    margin = 4 * grow * near.speed * (left + U64 * size(t)) + 256 * U64 * U64 * far * grow
+    sure = (size(w) > blur * near.speed) & (outside | (form > margin) | ((form < -margin) & (left <= U64 * size(t))))
+    hit = todo & sure & ~outside & (form < 0)
+    outward = w * end
+    if side & FRONT:
+        hit = hit & (outward < 0)
+    elif side & BACK:
+        hit = hit & (outward > 0)
+    return rounded(t, load(ray, T, i)), hit, todo & ~sure
+
+
+@inline
+def height(e, e1, p, p1):
+    """e·p in pairs."""
+    x, x1 = multiply(e.x, e1.x, p.x, p1.x)
+    y, y1 = multiply(e.y, e1.y, p.y, p1.y)
+    z, z1 = multiply(e.z, e1.z, p.z, p1.z)
+    s, s1 = add(x, x1, y, y1)
+    return add(s, s1, z, z1)
+
+
+@kernel
+def settle_cap(rays, i, p, table, q, end, opacity):
+    """Ray i against the cap at e·p = end, the slow and certain way."""
+    out_of_line()
+    rays.tally[SLOW] += 1
+    exact, side = table.exact, table.side[q]
+    f, d, form, low, rise = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(LONG)
+    terms, square_t = np.empty(2 * LONG * LONG + 5 * LONG + LONG), np.empty(LONG)
+    ray_parts(rays.ray, i, exact, q, f, d)
+    heights(exact, q, f, low)
+    heights(exact, q, d, rise)
+    if rise[0] == 0 or (side & FRONT and rise[0] * end > 0) or (side & BACK and rise[0] * end < 0):
+        return
+    for k in range(LONG):
+        terms[k] = -low[k]
+    terms[LONG] = end
+    expand(terms, LONG + 1, low)
+    t = divide(low[0], low[1], rise[0], rise[1])
+    line_form(exact, q, f, d, form)
+    n = put_products(terms, 0, 1.0, t, t)
+    expand(terms, n, square_t)
+    n = put_products(terms, 0, 1.0, form[0], square_t)
+    n = put_products(terms, n, 2.0, t, form[1])
+    for k in range(LONG):
+        terms[n + k] = form[2, k]
+    expand(terms, n + LONG, square_t)
+    if square_t[0] <= 2.0 ** -98 * (abs(form[0, 0] * t[0] * t[0]) + abs(form[1, 0] * t[0]) + abs(form[2, 0])):
+        record_one(rays, i, p, t[0], opacity)
 
 
 @kernel
@@ -118,13 +228,30 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
-                data = table.data
+                most, curved, limit = (np.float64(table.data[q, MOST]), np.float64(table.data[q, CURVED]), np.float64(table.data[q, LIMIT]))
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        o = into(data, q, load3(rays.ray, OX, i) - splat3(data, q, CENTER))
-                        d = into(data, q, load3(rays.ray, DX, i))
-                        hit_frustum(rays, i, first + q, o, d, data[q, BASE], data[q, SLOPE], data[q, CAPPED] > 0, table.side[q], opacity)
+                        near = approach(rays.ray, i, table.exact, q, most, curved)
+                        todo = may_meet(near)
+                        late = 0
+                        if any_lane(todo):
+                            t, found, unsure = _second.meet(rays.ray, i, table.exact, q, most, IN_SLAB, limit, todo, near, table.side[q])
+                            record(rays, i, first + q, t, found, opacity)
+                            late = bits(unsure)
+                        while late:
+                            _second.settle(rays, i + lowest(late), first + q, table, q, IN_SLAB, opacity)
+                            late &= late - 1
+                        for cap in range(2):
+                            if table.data[q, LOWER + cap] > 0:
+                                todo = near_cap(rays.ray, i, table.exact, q, near, cap - 0.5)
+                                if any_lane(todo):
+                                    t, found, unsure = meet_cap(rays.ray, i, table.exact, q, most, cap - 0.5, todo, near, table.side[q])
+                                    record(rays, i, first + q, t, found, opacity)
+                                    late = bits(unsure)
+                                while late:
+                                    settle_cap(rays, i + lowest(late), first + q, table, q, cap - 0.5, opacity)
+                                    late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -140,7 +267,8 @@ def surface(rays, n, out, table, first):
             base, slope = np.float64(data[q, BASE]), np.float64(data[q, SLOPE])
             radius, off = base + slope * z, np.sqrt(x * x + y * y)
             beside, below, above = abs(off - radius), abs(z), abs(z - 1)
-            if data[q, CAPPED] > 0 and min(below, above) < beside:
+            below, above = below if data[q, LOWER] > 0 else np.inf, above if data[q, UPPER] > 0 else np.inf
+            if min(below, above) < beside:
                 z = 0.0 if below < above else 1.0
                 put_placed(out, i, data, q, x, y, z, 0.0, 0.0, 2 * z - 1, (x + 1) / 2, (y + 1) / 2)
             else:

@@ -11,13 +11,13 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
-from rtcore.exact import inverse, moved, rationals
+from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
 from rtcore.jit import kernel
 from rtcore.lanes import any_lane, bits
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
-from rtcore.shapes._second import BOX, FORM, INTO, approach, exact_row, may_meet, meet, settle
+from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, INTO, approach, may_meet, meet, settle
 from rtcore.shapes.kind import OWN, Kind, Packed, around, forward, normalized, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import record
 
@@ -50,9 +50,8 @@ class Quadric(Shape, frozen=True):
         low, high = np.array(self.low or (-1.0, -1.0, -1.0)), np.array(self.high or (1.0, 1.0, 1.0))    # a box that an open one won't use
         middle, half = low / 2 + high / 2, power_over((high / 2 - low / 2).max())
         form = moved_form(rationals(self.coefficients), rationals(middle), Fraction(half))
-        into = [x / Fraction(half) for row in inverse(matrix) for x in row]
         box = [(x - m) / Fraction(half) for corner in (low, high) for x, m in zip(rationals(corner), rationals(middle))]
-        exact = np.array(exact_row(moved(matrix, middle), into, form, box))
+        exact = np.array([*parts(moved(matrix, middle), 3), *(inverse_parts(matrix) / half), *parts(form, 3), *parts(box)])
         unit = np.diag([half] * 3 + [1.0])
         unit[:3, 3] = middle
         local = matrix @ unit
@@ -92,11 +91,11 @@ def intersect(rays, n, tree, table, first, opacity):
                         near = approach(rays.ray, i, table.exact, q, most, curved)
                         todo = may_meet(near)
                         if any_lane(todo):
-                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, True, todo, near, table.side[q])
+                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, IN_BOX, 2.0, todo, near, table.side[q])
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
-                                settle(rays, i + lowest(late), first + q, table, q, True, opacity)
+                                settle(rays, i + lowest(late), first + q, table, q, IN_BOX, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
@@ -110,11 +109,11 @@ def intersect_open(rays, n, tree, table, first, opacity):
             near = approach(rays.ray, i, table.exact, q, most, curved)
             todo = may_meet(near)
             if any_lane(todo):
-                t, found, unsure = meet(rays.ray, i, table.exact, q, most, False, todo, near, table.side[q])
+                t, found, unsure = meet(rays.ray, i, table.exact, q, most, EVERYWHERE, 2.0, todo, near, table.side[q])
                 record(rays, i, first + q, t, found, opacity)
                 late = bits(unsure)
                 while late:
-                    settle(rays, i + lowest(late), first + q, table, q, False, opacity)
+                    settle(rays, i + lowest(late), first + q, table, q, EVERYWHERE, opacity)
                     late &= late - 1
 
 
