@@ -8,8 +8,11 @@ import pytest
 
 import rtcore
 from rtcore import Implicit, Plane, Polygon, Quadric, Sphere, Torus, Triangle, solvers
+from rtcore.jit import kernel
 from rtcore.reports.oracle import crossings, mp
 from rtcore.solvers import implicit
+from rtcore.solvers._orellana import put_orellana
+from rtcore.solvers._quartic import put_ferrari, put_sturm
 
 PARABOLOID = Quadric((1, 1, 0, 0, 0, 0, 0, 0, -1, 0))
 SHAPES = (Sphere((0.1, 0.2, 0.3), 1.2), Plane((0.1, 0.2, 0.3), (1, 2, 3)), Triangle((-2, -2, 0.1), (3, -1, 0.5), (0.2, 3, 0)),
@@ -129,6 +132,29 @@ def test_torus_from_far_away():
     assert not raw or abs(raw[0] - true) > 1e-4
     for name in ("companion", "sturm", "orellana"):
         assert one(ring, name, origin, (1, 0, 0))[0] == pytest.approx(true, abs=1e-9)
+
+
+@kernel
+def real_roots(coefficients, roots, count):
+    """Ferrari's, Sturm's and Algorithm 1010's real roots of x⁴ + a x³ + b x² + c x + d."""
+    a, b, c, d = coefficients
+    put_ferrari(a, b, c, d, roots, count, 0)
+    put_sturm(a, b, c, d, roots, count, 1)
+    put_orellana(a, b, c, d, roots, count, 2)
+
+
+@pytest.mark.parametrize(("coefficients", "true"), [
+    ((-240, 25449, -1325880, 26471900.25), [50.6451126969, 69.3548873031]), ((2, 0, 0, -16), [-2.7605551382, 1.6383450268]),
+    ((0, -5, 0, 4), [-2, -1, 1, 2]), ((-10, 35, -50, 24), [1, 2, 3, 4]), ((0, 0, 0, 1), []), ((0, 0, 0, -1), [-1, 1])])
+def test_quartics(coefficients, true):
+    for dtype, off in ((np.float64, 1e-5), (np.float32, 2e-2)):
+        roots, count = np.full((3, 4), np.nan, dtype), np.zeros(3, np.int32)
+        real_roots(np.array(coefficients, dtype), roots, count)
+        for i, name in enumerate(("ferrari", "sturm", "orellana")):
+            if dtype == np.float64 or abs(coefficients[-1]) < 100:      # in float32 all three lose the first one's roots
+                assert sorted(roots[i, :count[i]]) == pytest.approx(true, abs=off), (name, dtype)
+            if dtype == np.float64 and name != "ferrari":
+                assert sorted(roots[i, :count[i]]) == pytest.approx(true, abs=1e-9), name
 
 
 def test_the_renderer_imports_no_solver():

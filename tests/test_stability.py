@@ -84,7 +84,7 @@ def test_condition_is_the_sensitivity(shape):
     """No change of the inputs by 1e-12 moves a root by more than the condition allows, and some change moves it by a good part of that."""
     rng = np.random.default_rng(2)
     batch = next(batches("plain", shape, np.float64, 8, 1))
-    true = measure.truths(batch)
+    true = [truth.t for truth in measure.truths(batch)]
     k = next(k for k, t in enumerate(true) if t is not None)
     o, d, t = batch.origins[k], batch.directions[k], true[k]
     allowed = condition(batch.shape, HERE, o, d, t) * 1e-12
@@ -130,6 +130,16 @@ def test_the_textbook_is_shown_as_it_is():
     assert rows["stable"].nonfinite > 0
     assert rows["renderer"].wrong == rows["renderer"].nonfinite == 0
     assert all(row.rays == len(CATALOGUE[Sphere]) and row.ns_per_ray > 0 for row in rows.values())
+
+
+def test_another_crossing_is_wrong(monkeypatch):
+    """The far wall in place of the near one is no error of some ulps."""
+    batch = Batch(Sphere((0, 0, 0), 1), (), np.array([(0, 0, -5.0)] * 2), np.array([(0, 0, 1.0)] * 2), 1)
+    monkeypatch.setattr(measure, "batches", lambda *_: [batch])
+    monkeypatch.setattr(measure, "by_renderer", lambda *_: measure.Answer(np.array([6.0, 4.5]), np.full(2, True), np.full(2, False)))
+    row = next(measure.measure(Sphere, "far", "f64", 2, 0, 16))
+    assert (row.rays, row.wrong, row.met) == (2, 1, False) and row.max_ulp == pytest.approx(0.5 * 2 ** 50)
+    assert "another crossing than the first (t = 6.0); true t 4.0" in row.worst[0].what
 
 
 def test_rays_in_the_shapes_own_space():

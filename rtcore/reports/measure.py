@@ -21,6 +21,7 @@ from rtcore.wave import DX, OX, START, T, new_rays
 
 #: Crossings nearer to the origin than that, in units of its own distance from 0, are at the origin: the oracle has 50 digits.
 AT_ORIGIN = mp.mpf(10) ** -40
+LOST = 8            # an error of more ulps, and of more times the condition, may mean another crossing
 MOST_POINTS, MOST_WORST = 60, 3
 TIMED_BATCHES, REPEATS = 2, 4
 
@@ -33,12 +34,20 @@ class Answer(NamedTuple):
     wild: np.ndarray
 
 
-def truths(batch: Batch) -> list:
-    """The true t of each ray's first crossing past 0, an mpf; None for a miss."""
+class Truth(NamedTuple):
+    """The t of a ray's first crossing past 0, an mpf, None for a miss; and those of all its crossings."""
+
+    t: object
+    all: tuple
+
+
+def truths(batch: Batch) -> list[Truth]:
+    """What is true of each ray."""
     found = []
     for o, d in zip(batch.origins, batch.directions):
         least = AT_ORIGIN * float(np.abs(o).max()) / float(np.abs(d).max())
-        found.append(next((c.t for c in crossings(batch.shape, batch.matrix, o, d) if c.t > least), None))
+        every = tuple(c.t for c in crossings(batch.shape, batch.matrix, o, d))
+        found.append(Truth(next((t for t in every if t > least), None), every))
     return found
 
 
@@ -89,18 +98,13 @@ def measure(shape: type[Shape], family: str, precision: str, n: int, seed: int, 
     """A row for each solver of the shape, over about n rays of the family; `timed` is how many rays the clock is held to at a time."""
     dtype = DTYPES[precision]
     sets = [batch for batch in batches(family, shape, dtype, n, seed) if len(batch.origins)]
-    true = [_within(truths(batch), dtype) for batch in sets]
+    true = [truths(batch) for batch in sets]
     for name in names(shape):
         tally = _Tally(shape, name, precision, family)
         for batch, truth in zip(sets, true):
             tally.add(batch, truth, by_renderer(batch, precision) if name == RENDERER else by_solver(batch, name))
         taken = [batch for batch in sets[:TIMED_BATCHES] if name != RENDERER or not refused(batch, precision)]
         yield tally.row(min((_nanoseconds(batch, name, precision, timed) for batch in taken), default=math.nan))
-
-
-def _within(truth: list, dtype) -> list:
-    """With NaN for a t that is no number of the type: there is nothing to be right about."""
-    return [math.nan if t is not None and not np.finfo(dtype).tiny <= float(t) <= np.finfo(dtype).max else t for t in truth]
 
 
 class _Tally:
@@ -115,36 +119,48 @@ class _Tally:
         self.points: list[Point] = []
         self.worst: list[Worst] = []
 
-    def add(self, batch: Batch, truth: list, answer: Answer) -> None:
+    def add(self, batch: Batch, truth: list[Truth], answer: Answer) -> None:
         """One batch's rays."""
         scale = abs(np.linalg.det(batch.matrix[:3, :3])) ** (1 / 3) * batch.size
         distance = np.abs((batch.origins - batch.matrix[:3, 3]) @ (invertible(batch.matrix)[:3, :3].T / batch.size)).max(axis=1)
-        for i, true in enumerate(truth):
-            if true is not None and math.isnan(true):
-                continue
+        for i, (true, every) in enumerate(truth):
+            if true is not None and not np.finfo(self.dtype).tiny <= float(true) <= np.finfo(self.dtype).max:
+                continue        # no number of the type is right
             self.rays += 1
             if answer.wild[i]:
                 self.nonfinite += 1
                 self._show(True, math.inf, f"not finite (t = {answer.t[i]})", batch, i, true)
             if answer.hit[i] != (true is not None):
-                self.wrong += 1
-                what = "a miss, reported as a hit" if true is None else "a hit, reported as a miss"
-                self._show(self.target is not None and self.target.counts_hits(self.family), math.inf, what, batch, i, true)
+                self._mistaken("a miss, reported as a hit" if true is None else "a hit, reported as a miss", batch, i, true)
             elif true is not None and not answer.wild[i]:
                 error = ulps(answer.t[i], true, self.dtype)
+                if error > LOST and self._another(error, float(answer.t[i]), batch, i, true, every):
+                    self._mistaken(f"another crossing than the first (t = {answer.t[i]})", batch, i, true)
+                    continue
                 self.errors.append(error)
                 self.points.append(Point(float(distance[i]), float(scale), error))
                 self._show(self._over(error, batch, i, true), error, f"{error:.3g} ulp", batch, i, true)
+
+    def _mistaken(self, what: str, batch: Batch, i: int, true) -> None:
+        """Count a wrong hit or miss."""
+        self.wrong += 1
+        self._show(self.target is not None and self.target.counts_hits(self.family), math.inf, what, batch, i, true)
+
+    def _another(self, error: float, t: float, batch: Batch, i: int, true, every: tuple) -> bool:
+        """Whether a hit is of another crossing: one that is nearer, and the first further off than its condition explains."""
+        nearer = any(abs(t - other) < abs(t - true) for other in every)
+        return nearer and error > self._explained(LOST, batch, i, true)
 
     def _over(self, error: float, batch: Batch, i: int, true) -> bool:
         """Whether the error of a hit is beyond the target."""
         if self.target is None or error <= self.target.ulp[self.precision]:
             return False
-        if not self.target.factor:
-            return True
+        return not self.target.factor or error > self._explained(self.target.factor, batch, i, true)
+
+    def _explained(self, factor: float, batch: Batch, i: int, true) -> float:
+        """factor · condition · u in ulps of the true t."""
         sensitive = condition(batch.shape, batch.matrix, batch.origins[i], batch.directions[i], true)
-        allowed = self.target.factor * UNIT[self.precision] * sensitive * float(true)
-        return error * float(np.spacing(self.dtype(float(true)))) > allowed
+        return factor * UNIT[self.precision] * sensitive * float(true) / float(np.spacing(self.dtype(float(true))))
 
     def _show(self, missed: bool, ulp: float, what: str, batch: Batch, i: int, true) -> None:
         """Keep the ray if it is among the worst; count it if it misses the target."""

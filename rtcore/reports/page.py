@@ -11,7 +11,8 @@ ABOUT = """\
 
 - The truth is mpmath's, at 50 digits, on the very numbers the kernel receives: rays and the shape's numbers rounded to the precision, the
   node's matrix in float64. The oracle's formulas are the textbook's and share no code with the kernels.
-- Every ray asks for the first crossing past 0. *Wrong* counts hits reported as misses and misses reported as hits; a tangent is a hit.
+- Every ray asks for the first crossing past 0. *Wrong* counts hits reported as misses, misses reported as hits, and hits of another
+  crossing than the first (one that is nearer to the answer, where the root's condition does not explain it); a tangent is a hit.
   Errors are in units in the last place (ulp) of the true t, over the rays that both call a hit. *Not finite* counts rays with a root or a
   normal that is NaN or infinite. *ns* is the least of several runs of the kernel alone, per ray, on one core.
 - *renderer* is what pictures are made with, the tree included; the other solvers get the ray in the shape's own space, taken there in

@@ -45,7 +45,7 @@ class Row:
     precision: str
     family: str
     rays: int
-    wrong: int              # hits that are misses in truth, and misses that are hits
+    wrong: int              # hits that are misses in truth, misses that are hits, and hits of another crossing than the first
     p50: float
     p99: float
     max_ulp: float
