@@ -1,27 +1,22 @@
-"""Torus: eight quartics at once, isolated between critical points, polished on the distance itself.
-
-With the ray's origin at the closest approach to the centre and everything scaled to R + r = 1 the quartic has no cubic term to
-speak of and coefficients of order 1. Its second derivative's roots isolate those of the first, these isolate the quartic's own (Yuksel,
-*High-Performance Polynomial Root Finding for Graphics*, 2022). Signs come from the factored form
-
-    f = g₁ g₂,  g₁ = (ρ - R)² + z² - r²,  g₂ = (ρ + R)² + z² - r²,  ρ = |(x, y)|,
-
-which does not cancel, and each root takes Newton steps on its own factor.
-"""
+"""Torus: quartics, eight at once; what makes the answer certain is in `_torus.py`."""
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Number
 from rtcore.jit import inline, kernel
-from rtcore.lanes import along, any_lane, dot, fma, greatest, least, load, load3, root, select, size, splat3
+from rtcore.lanes import any_lane, bits, dot, load, load3, root, rounded, size, splat3, wide
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, OWN, Kind, Packed, around, forward, into, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, record
+from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet
+from rtcore.shapes._torus import CONSTANTS, RADII, first_root, isolate, may_cross, settle
+from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
+from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, around, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.wave import DX, OX, START, T, record
 
-MAJOR, MINOR = OWN, OWN + 1
-STEPS = 9           # of bisected Newton: the interval is then below 1/512 of the first, or Newton has long converged
+MAJOR, MINOR, MOST = OWN, OWN + 1, OWN + 2      # the radii in the unit shape's lengths; the largest number of the matrix L into it
 
 
 class Torus(Shape, frozen=True):
@@ -35,121 +30,80 @@ class Torus(Shape, frozen=True):
         return TORUS
 
     def pack(self, matrix: np.ndarray) -> Packed:
-        most = self.major_radius + self.minor_radius
-        local = matrix @ np.diag([most] * 3 + [1.0])
-        return Packed(TORUS, placed(local, invertible(local), self.major_radius / most, self.minor_radius / most)[None])
+        # in lengths of a power of two above R + r, so that the radii keep their digits
+        unit = float(np.ldexp(1.0, np.frexp(self.major_radius / 2 + self.minor_radius / 2)[1] + 1))
+        major, minor = Fraction(self.major_radius) / Fraction(unit), Fraction(self.minor_radius) / Fraction(unit)
+        local = matrix @ np.diag([unit] * 3 + [1.0])
+        around_center = invertible(local)
+        back = [x / Fraction(unit) for row in inverse(matrix) for x in row]
+        exact = [*parts(moved(matrix, (0, 0, 0)), 3), *parts(back, 3), float(major), float(minor),
+                 *parts([major * major - minor * minor]), *parts([4 * major * major])]
+        return Packed(TORUS, placed(local, around_center, float(major), float(minor), float(max(map(abs, back))))[None],
+                      exact=np.array([exact]))
 
 
 @inline
-def factors(n, e, s, major, square):
-    """g₁ and g₂ at n + s e."""
-    p = along(n, s, e)
-    off = root(p.x * p.x + p.y * p.y)
-    rest = p.z * p.z - square
-    return fma(off - major, off - major, rest), fma(off + major, off + major, rest)
+def spread(most, g, v, f, d):
+    """What the errors of f = L g and d = L v are roundings of wherever f + t d is within 1 of its closest approach, `most` being the
+    largest number of L."""
+    dd = dot(d, d)
+    return most * (extent(g) + extent(v) * (size(dot(f, d) / dd) + 1 / root(dd)))
 
 
 @inline
-def newton(lo, hi, rising, p, q, c, order):
-    """The root of σ⁴ + pσ² + qσ + c (order 0) or of its derivative (order 1) between lo and hi, where it goes through 0 once, upward
-    where `rising`. Steps that leave the bracket are halvings."""
-    x = 0.5 * (lo + hi)
-    for _ in range(STEPS):
-        if order == 0:
-            y, slope = fma(fma(fma(x, x, p), x, q), x, c), fma(fma(4 * x, x, 2 * p), x, q)
-        else:
-            y, slope = fma(fma(4 * x, x, 2 * p), x, q), fma(12 * x, x, 2 * p)
-        below = (y < 0) ^ ~rising
-        lo, hi = select(below, x, lo), select(below, hi, x)
-        x = x - y / slope
-        x = select((x >= lo) & (x <= hi), x, 0.5 * (lo + hi))      # at the bracket's end it has converged
-    return x
+def quick(rays, i, data, q):
+    """Whether any of eight rays may meet the ball about torus q, by float32 arithmetic alone."""
+    g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
+    f, d = into(data, q, g), into(data, q, v)
+    return any_lane(may_meet(closest(f, d, data[q, MAJOR] + data[q, MINOR], spread(data[q, MOST], g, v, f, d), U32)))
 
 
 @inline
-def polish(n, e, s, major, square, reach):
-    """Three Newton steps on the factor that is nearest to 0; a step longer than `reach` is not taken (a tangent has no slope)."""
-    for _ in range(3):
-        p = along(n, s, e)
-        off = root(p.x * p.x + p.y * p.y)
-        rest = p.z * p.z - square
-        g, h = fma(off - major, off - major, rest), fma(off + major, off + major, rest)
-        outer = size(g) <= size(h)
-        inward = select(outer, off - major, off + major)
-        slope = 2 * (inward * (p.x * e.x + p.y * e.y) / off + p.z * e.z)
-        step = select(outer, g, h) / slope
-        s = select(size(step) <= reach, s - step, s)
-    return s
+def approach(ray, i, data, exact, q):
+    """Of eight rays and torus q: origins and directions in its unit space, what `spread` says, and what `closest` says of the ball."""
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
+    f, d = into_plain(exact, q, g), into_plain(exact, q, v)
+    far = spread(np.float64(data[q, MOST]), g, v, f, d)
+    return f, d, far, closest(f, d, exact[q, RADII] + exact[q, RADII + 1], far, U64)
 
 
 @inline
-def hit_torus(rays, i, number, o, d, major, minor, side, opacity):
-    """Eight rays, o and d in the unit space of a torus of these radii (numbers)."""
-    start = load(rays.ray, START, i)
-    speed = root(dot(d, d))
-    e = d * (1 / speed)
-    n = along(o, -dot(o, e), e)
-    moved = dot(n, e)                       # the closest approach once more: what the first step's rounding left
-    n = along(n, -moved, e)
-    shift = dot(n - o, e)
-    nn, square = dot(n, n), minor * minor
-    inside = 1 - nn
-    if not any_lane(inside >= 0):
-        return
-    reach = root(greatest(inside, 0)) * 1.0001 + 1e-6
-    k = nn + (major * major - square)
-    p = 2 * k - 4 * major * major * (e.x * e.x + e.y * e.y)
-    q = -8 * major * major * (n.x * e.x + n.y * e.y)
-    c = k * k - 4 * major * major * (n.x * n.x + n.y * n.y)
-    bend = least(root(greatest(-p / 6, 0)), reach)
-    # the derivative's roots, one in each stretch between the bends where it changes sign; else the stretch's end
-    c0 = stationary(-reach, -bend, p, q)
-    c1 = stationary(-bend, bend, p, q)
-    c2 = stationary(bend, reach, p, q)
-    best, lo = 0 * start + np.inf, -reach
-    g, h = factors(n, e, lo, major, square)
-    f = g * h
-    for piece in range(4):
-        hi = c0 if piece == 0 else c1 if piece == 1 else c2 if piece == 2 else reach
-        g, h = factors(n, e, hi, major, square)
-        after = g * h
-        cross = ((f > 0) ^ (after > 0)) & (inside >= 0) & ~(best < np.inf)
-        if side != 0:
-            cross = cross & (f > 0) if side & FRONT else cross & ~(f > 0)
-        if any_lane(cross):
-            s = newton(lo, hi, ~(f > 0), p, q, c, 0)
-            s = polish(n, e, s, major, square, 1e-2 * minor)
-            t = (s + shift) / speed
-            best = select(cross & (t > start), t, best)
-        lo, f = hi, after
-    record(rays, i, number, best, best < np.inf, opacity)
-
-
-@inline
-def stationary(lo, hi, p, q):
-    """Where the quartic's derivative changes sign between lo and hi, else hi."""
-    at_lo, at_hi = fma(fma(4 * lo, lo, 2 * p), lo, q), fma(fma(4 * hi, hi, 2 * p), hi, q)
-    cross = (at_lo > 0) ^ (at_hi > 0)
-    if not any_lane(cross):
-        return hi
-    return select(cross, newton(lo, hi, ~(at_lo > 0), p, q, q, 1), hi)
+def window(ray, i):
+    """The interval of eight rays, in float64."""
+    return wide(load(ray, START, i)), wide(load(ray, T, i))
 
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
-    data = table.data
+    exact = table.exact
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree)
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
-                        i = start + g * 8
-                        o = into(data, q, load3(rays.ray, OX, i) - splat3(data, q, CENTER))
-                        d = into(data, q, load3(rays.ray, DX, i))
-                        hit_torus(rays, i, first + q, o, d, data[q, MAJOR], data[q, MINOR], table.side[q], opacity)
+                    i = start + g * 8
+                    if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick(rays, i, table.data, q)):
+                        f, d, far, near = approach(rays.ray, i, table.data, exact, q)
+                        begins, ends = window(rays.ray, i)
+                        todo = may_meet(near) & (begins < ends)
+                        if any_lane(todo):
+                            course = isolate(todo, f, d, near, far, exact[q, RADII], exact[q, RADII + 1])
+                            todo = may_cross(todo, course)
+                            if any_lane(todo):
+                                f1, v, v1 = f, d, d
+                                if table.data.itemsize == 8:
+                                    f, f1, v, v1 = line_in_pairs(rays.ray, i, exact, q)
+                                t, found, unsure = first_root(
+                                    todo, course, near[1], root(dot(d, d)), f, f1, v, v1, exact[q, CONSTANTS], exact[q, CONSTANTS + 1],
+                                    exact[q, CONSTANTS + 2], exact[q, CONSTANTS + 3], far, begins, ends, table.side[q],
+                                    table.data.itemsize == 8)
+                                record(rays, i, first + q, rounded(t, load(rays.ray, T, i)), found, opacity)
+                                late = bits(unsure)
+                                while late:
+                                    settle(rays, i + lowest(late), first + q, table, q, opacity)
+                                    late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
