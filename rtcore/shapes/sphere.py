@@ -52,7 +52,7 @@ class Sphere(Shape, frozen=True):
         local[:3, 3] = center
         back = [x / Fraction(self.radius) for row in inverse(matrix) for x in row]
         exact = [*parts(moved(matrix, self.center), 3), *parts(back, 3)]
-        return Packed(ELLIPSOID, placed(local, invertible(local), max(map(abs, back)))[None], exact=np.array([exact]))
+        return Packed(ELLIPSOID, placed(local, invertible(local), *parts([max(map(abs, back))], 1))[None], exact=np.array([exact]))
 
 
 def round_scale(matrix: np.ndarray) -> float | None:
