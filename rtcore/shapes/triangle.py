@@ -9,11 +9,16 @@ import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
 from rtcore.scene import Shape, invertible
+from rtcore.shapes._ball import lowest
 from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, hit_from, normalized, put_surface
-from rtcore.wave import DX, NX, NY, NZ, OX, record
+from rtcore.wave import DX, NX, NY, NZ, OX, SLOW, record, record_one
+
+
+#: Twice a triangle's area, seen along the ray, below which products may have lost digits to underflow.
+TINY32, TINY64 = 2.0 ** -100, 2.0 ** -900
 
 
 class Triangle(Shape, frozen=True):
@@ -143,36 +148,55 @@ def shear(rays, start, n, slant, axes):
 
 
 @inline
-def hit_flat(rays, i, j, p, data, q, slant, axis, alone, side, opacity):
-    """Eight rays, those whose main axis is `axis`, against triangle q. i: their column in rays, j: in the packet."""
+def edges(ray, i, j, data, q, slant, axis):
+    """Of eight rays and triangle q: the three edge functions, and the corners' distances along `axis`. i: the rays' column in ray, j: in
+    the packet."""
     kx, ky = (axis + 1) % 3, (axis + 2) % 3
     sx, sy = load(slant, 0, j), load(slant, 1, j)
-    ox, oy, oz = load(rays.ray, OX + kx, i), load(rays.ray, OX + ky, i), load(rays.ray, OX + axis, i)
+    ox, oy, oz = load(ray, OX + kx, i), load(ray, OX + ky, i), load(ray, OX + axis, i)
     az, bz, cz = data[q, axis] - oz, data[q, 3 + axis] - oz, data[q, 6 + axis] - oz
     ax, ay = fma(-sx, az, data[q, kx] - ox), fma(-sy, az, data[q, ky] - oy)
     bx, by = fma(-sx, bz, data[q, 3 + kx] - ox), fma(-sy, bz, data[q, 3 + ky] - oy)
     cx, cy = fma(-sx, cz, data[q, 6 + kx] - ox), fma(-sy, cz, data[q, 6 + ky] - oy)
     # a difference of two rounded products never has the wrong sign, only 0: no ray falls between two triangles. Not to be fused.
-    u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
-    front = (u <= 0) & (v <= 0) & (w <= 0)
-    back = (u >= 0) & (v >= 0) & (w >= 0)
-    ok = front | back
-    if not alone:
-        ok = ok & (load(slant, 3, j) == axis)
-    if any_lane(ok):
-        det = u + v + w
-        inverse = load(slant, 2, j)
-        if side & (FRONT | BACK):
-            # a ray along -axis, inverse < 0, sees the front where det < 0
-            facing = det * inverse
-            ok = ok & (facing > 0) if side == FRONT or side == BACK + MIRRORED else ok & (facing < 0)
-        record(rays, i, p, (u * az + v * bz + w * cz) / det * inverse, ok & ((det < 0) | (det > 0)), opacity)
+    return cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax, az, bz, cz
+
+
+@kernel
+def settle(rays, i, p, table, q, axis, opacity):
+    """Ray i against triangle q where the edge functions are so small that digits of them are lost: as above, in units of the triangle."""
+    out_of_line()
+    rays.tally[SLOW] += 1
+    ray, data = rays.ray, table.data
+    kx, ky = (axis + 1) % 3, (axis + 2) % 3
+    inverse = 1 / np.float64(ray[DX + axis, i])
+    sx, sy = ray[DX + kx, i] * inverse, ray[DX + ky, i] * inverse
+    x, y, z = np.empty(3), np.empty(3), np.empty(3)
+    most = 0.0
+    for k in range(3):
+        z[k] = np.float64(data[q, 3 * k + axis]) - ray[OX + axis, i]
+        x[k] = (np.float64(data[q, 3 * k + kx]) - ray[OX + kx, i]) - sx * z[k]
+        y[k] = (np.float64(data[q, 3 * k + ky]) - ray[OX + ky, i]) - sy * z[k]
+        most = max(most, max(abs(x[k]), abs(y[k])))
+    if most == 0:
+        return
+    for k in range(3):
+        x[k], y[k] = x[k] / most, y[k] / most
+    u, v, w = x[2] * y[1] - y[2] * x[1], x[0] * y[2] - y[0] * x[2], x[1] * y[0] - y[1] * x[0]
+    det = u + v + w
+    front = det * inverse > 0
+    if table.side[q] & MIRRORED:
+        front = not front
+    seen = front if table.side[q] & FRONT else not front if table.side[q] & BACK else True
+    if seen and det != 0 and (min(u, min(v, w)) >= 0 or max(u, max(v, w)) <= 0):
+        record_one(rays, i, p, (u * z[0] + v * z[1] + w * z[2]) / det * inverse, opacity)
 
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     slant, axes = np.empty((4, PACKET), rays.ray.dtype), np.empty(PACKET // 8, np.int64)
+    tiny = TINY32 if rays.ray.itemsize == 4 else TINY64
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree)
         if walk.state[0] == 0:
@@ -181,12 +205,28 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                side = table.side[q]
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
+                        i = start + g * 8
                         for axis in range(3):
                             if (axes[g] >> axis) & 1:
-                                hit_flat(rays, start + g * 8, g * 8, first + q, table.data, q, slant, axis, axes[g] == 1 << axis,
-                                         table.side[q], opacity)
+                                u, v, w, az, bz, cz = edges(rays.ray, i, g * 8, table.data, q, slant, axis)
+                                ok = ((u <= 0) & (v <= 0) & (w <= 0)) | ((u >= 0) & (v >= 0) & (w >= 0))
+                                if axes[g] != 1 << axis:
+                                    ok = ok & (load(slant, 3, g * 8) == axis)
+                                if any_lane(ok):
+                                    det, inverse = u + v + w, load(slant, 2, g * 8)
+                                    late = bits(ok & (size(det) < tiny))
+                                    if side & (FRONT | BACK):
+                                        # a ray along -axis, inverse < 0, sees the front where det < 0
+                                        facing = det * inverse
+                                        ok = ok & (facing > 0) if side == FRONT or side == BACK + MIRRORED else ok & (facing < 0)
+                                    ok = ok & (size(det) >= tiny)
+                                    record(rays, i, first + q, (u * az + v * bz + w * cz) / det * inverse, ok, opacity)
+                                    while late:
+                                        settle(rays, i + lowest(late), first + q, table, q, axis, opacity)
+                                        late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
