@@ -137,8 +137,8 @@ def settle(code, search, k):
         if turned and there >= 0:
             s = bisect(code, search, a, probe[POINT, j], sign, SLOPE)
             for i in range(8):
-                probe[POINT, i] = s
-            place(probe, point, POINT, POINT)
+                probe[A, i], probe[B, i] = s - 2 * width, s + 2 * width
+            place(probe, point, A, B)
             run(code, search.reg, point, False)
             f = sure(point, 0)
             if f * sign >= 0:       # it touches, or it passes by
@@ -185,11 +185,11 @@ def enclose(search, k):
     state[A, k], state[B, k] = na, max(na, nb)
     state[POINT, k] = min(max(guess, na), nb)
     slow = nb - na > 0.5 * (b - a)
-    if low <= 0 <= high and (slow or d1 <= 1.01 * d) or nb - na <= 4 * slack:
+    if low <= 0 <= high and (slow or d1 <= 1.01 * d) or nb - na <= 4 * slack or not na < middle(na, nb) < nb:
         return True
-    if slow:
+    if slow or not na < guess < nb:
         state[POINT, k] = middle(na, nb)
-    return not na < state[POINT, k] < nb
+    return False
 
 
 @kernel
