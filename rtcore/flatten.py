@@ -111,13 +111,14 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
     tree, has_tree = EMPTY_TREE, False
     if kind.bounds is not None and len(data):
-        # bounds of the numbers that the kernel will see
-        rounded = data.astype(dtype).astype(np.float64), extra.astype(dtype).astype(np.float64)
-        low, high = kind.bounds(*rounded)
+        # bounds of the numbers that the kernel will see: kinds that have exact ones use those
+        seen = np.float64 if exact.shape[1] else dtype
+        low, high = kind.bounds(data.astype(seen).astype(np.float64), extra.astype(seen).astype(np.float64))
         tree, order = build(low, high, kind.leaf_most)
         has_tree = len(tree.box) > 1
         data, owner, side, exact = data[order], owner[order], side[order], exact[order]
         if len(extra) and not kind.shared_extra:
             extra = extra[order]
-    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, dtype), side, np.ascontiguousarray(exact))
+    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, np.float64 if kind.shared_extra else dtype), side,
+                  np.ascontiguousarray(exact))
     return Group(kind, tree, table, 0, has_tree, key, owner, sum(p.dropped for _, p in packs))

@@ -6,9 +6,9 @@ import numpy as np
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import greatest, least, load, load3, select, splat3, with_sign
+from rtcore.lanes import greatest, least, load, load3, rounded, select, splat3, wide, with_sign
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes.kind import CENTER, FRONT, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, record
 
 
@@ -30,23 +30,27 @@ class Box(Shape, frozen=True):
         unit = np.diag([*(high - low) / 2, 1.0])
         unit[:3, 3] = low / 2 + high / 2
         local = matrix @ unit
-        return Packed(BOX, placed(local, invertible(local))[None])
+        row = placed(local, invertible(local))[None]
+        return Packed(BOX, row, exact=row)
 
 
 @inline
-def hit_cube(rays, i, p, o, d, side, opacity):
-    """Eight rays against the cube; a ray in the plane of a face (0·inf, a NaN) is left to the other slabs."""
+def hit_cube(ray, i, exact, q, side):
+    """Where eight rays meet box q, a cube in its unit space, and whether they do; in float64. A ray in the plane of a face (0·inf, a NaN)
+    is left to the other slabs."""
+    o = into(exact, q, wide(load3(ray, OX, i)) - splat3(exact, q, CENTER))
+    d = into(exact, q, wide(load3(ray, DX, i)))
     ix, iy, iz = 1 / d.x, 1 / d.y, 1 / d.z
     one = 1 + 0 * d.x
     # the face through which a slab is left; its counterpart is entered. A sign knows them apart where a minimum sees a NaN
     x, y, z = with_sign(one, d.x), with_sign(one, d.y), with_sign(one, d.z)
     enter = greatest((-z - o.z) * iz, greatest((-y - o.y) * iy, greatest((-x - o.x) * ix, -np.inf)))
     leave = least((z - o.z) * iz, least((y - o.y) * iy, least((x - o.x) * ix, np.inf)))
-    if side == 0:
-        t = select(enter > load(rays.ray, START, i), enter, leave)
-    else:
-        t = enter if side & 1 else leave
-    record(rays, i, p, t, enter <= leave, opacity)
+    start = load(ray, START, i)
+    t = select(enter > wide(start), enter, leave)
+    if side != 0:
+        t = enter if side & FRONT else leave
+    return rounded(t, start), enter <= leave
 
 
 @kernel
@@ -60,8 +64,8 @@ def intersect(rays, n, tree, table, first, opacity):
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        o = into(table.data, q, load3(rays.ray, OX, i) - splat3(table.data, q, CENTER))
-                        hit_cube(rays, i, first + q, o, into(table.data, q, load3(rays.ray, DX, i)), table.side[q], opacity)
+                        t, ok = hit_cube(rays.ray, i, table.exact, q, table.side[q])
+                        record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 

@@ -6,7 +6,7 @@ import numpy as np
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.jit import inline, kernel
-from rtcore.lanes import bits, dot, load, load3, splat3
+from rtcore.lanes import any_lane, dot, load, load3, rounded, splat3, wide
 from rtcore.scene import Shape
 from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, put_flat
 from rtcore.wave import DX, OX, START, T, record
@@ -43,7 +43,8 @@ class Polygon(Shape, frozen=True):
         normal /= np.linalg.norm(normal)
         mirrored = np.linalg.det(matrix[:3, :3]) < 0
         drop = float(np.abs(normal).argmax())
-        return Packed(POLYGON, np.array([[*points.mean(0), *(-normal if mirrored else normal), drop, 0.0, len(points)]]), points)
+        flat = [*points.mean(0), *(-normal if mirrored else normal)]
+        return Packed(POLYGON, np.array([[*flat, drop, 0.0, len(points)]]), points, exact=np.array([flat]))
 
 
 def newell(points: np.ndarray) -> np.ndarray:
@@ -54,26 +55,26 @@ def newell(points: np.ndarray) -> np.ndarray:
 
 
 @inline
-def hit_outline(rays, i, p, data, q, extra, side, opacity):
-    """Eight rays against polygon q."""
-    normal = splat3(data, q, NORMAL)
-    o, d = load3(rays.ray, OX, i), load3(rays.ray, DX, i)
+def on_plane(ray, i, exact, q, side):
+    """Where eight rays meet the plane of polygon q, in float64, and whether they do in their interval, seeing a visible side."""
+    normal, d = splat3(exact, q, NORMAL), wide(load3(ray, DX, i))
     speed = dot(normal, d)
-    t = dot(normal, splat3(data, q, 0) - o) / speed
-    ok = (t > load(rays.ray, START, i)) & (t <= load(rays.ray, T, i))
+    t = dot(normal, splat3(exact, q, 0) - wide(load3(ray, OX, i))) / speed
+    ok = (t > wide(load(ray, START, i))) & (t <= wide(load(ray, T, i)))
     if side & FRONT:
         ok = ok & (speed < 0)
     elif side & BACK:
         ok = ok & (speed > 0)
-    if bits(ok) == 0:
-        return
-    drop = int(data[q, DROP])
-    a, b = (drop + 1) % 3, (drop + 2) % 3
+    return t, ok
+
+
+@inline
+def in_outline(ray, i, extra, first, count, a, b, t):
+    """Lanes whose point at t is inside the outline extra[first .. first + count - 1], in the axes a and b."""
     # all seen from the ray's origin, so that a scene far from the world's keeps its digits
-    ox, oy = load(rays.ray, OX + a, i), load(rays.ray, OX + b, i)
-    x, y = t * load(rays.ray, DX + a, i), t * load(rays.ray, DX + b, i)
-    first, count = int(data[q, FIRST]), int(data[q, COUNT])
-    inside = speed < speed     # no lane
+    ox, oy = wide(load(ray, OX + a, i)), wide(load(ray, OX + b, i))
+    x, y = t * wide(load(ray, DX + a, i)), t * wide(load(ray, DX + b, i))
+    inside = t < t     # no lane
     previous = first + count - 1
     for k in range(first, first + count):
         x0, y0, x1, y1 = extra[previous, a], extra[previous, b], extra[k, a], extra[k, b]
@@ -83,7 +84,7 @@ def hit_outline(rays, i, p, data, q, extra, side, opacity):
         low = y0 - oy
         inside = inside ^ ((y >= low) & (y < y1 - oy) & ((x - (x0 - ox)) * (y1 - y0) < (y - low) * (x1 - x0)))
         previous = k
-    record(rays, i, p, t, ok & inside, opacity)
+    return inside
 
 
 @kernel
@@ -94,9 +95,14 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                drop, begins, count = int(table.data[q, DROP]), int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
-                        hit_outline(rays, start + g * 8, first + q, table.data, q, table.extra, table.side[q], opacity)
+                        i = start + g * 8
+                        t, ok = on_plane(rays.ray, i, table.exact, q, table.side[q])
+                        if any_lane(ok):
+                            ok = ok & in_outline(rays.ray, i, table.extra, begins, count, (drop + 1) % 3, (drop + 2) % 3, t)
+                            record(rays, i, first + q, rounded(t, load(rays.ray, T, i)), ok, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 

@@ -7,9 +7,9 @@ import numpy as np
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.fields import Field, FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import dot, greatest, least, load, load3, select, splat3
+from rtcore.lanes import dot, greatest, least, load, load3, rounded, select, splat3, wide
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import Kind, Packed, hit_from, put_surface
+from rtcore.shapes.kind import FRONT, Kind, Packed, hit_from, put_surface
 from rtcore.wave import DX, OX, START, record
 
 MOST_PLANES = 64
@@ -56,7 +56,7 @@ class Polyhedron(Shape, frozen=True):
         center = low / 2 + high / 2 if bounded(normals) else points[0]
         heights = ((points - center) * normals).sum(1)
         row = np.array([[*center, *low, *high, 0.0, len(points)]])
-        return Packed(self.kind(matrix), row, np.column_stack([normals, heights]))
+        return Packed(self.kind(matrix), row, np.column_stack([normals, heights]), exact=center[None])
 
 
 def half_spaces(planes, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,13 +101,12 @@ def extent(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 @inline
-def hit_solid(rays, i, p, data, q, extra, side, opacity):
-    """Eight rays against solid q."""
-    o, d = load3(rays.ray, OX, i) - splat3(data, q, 0), load3(rays.ray, DX, i)
-    start = load(rays.ray, START, i)
-    enter, leave = 0 * start - np.inf, 0 * start + np.inf
-    first = int(data[q, FIRST])
-    for k in range(first, first + int(data[q, COUNT])):
+def hit_solid(ray, i, exact, q, extra, first, count, side):
+    """Where eight rays meet solid q, of the planes extra[first .. first + count - 1], in float64, and whether they do."""
+    o, d = wide(load3(ray, OX, i)) - splat3(exact, q, 0), wide(load3(ray, DX, i))
+    start = load(ray, START, i)
+    enter, leave = 0 * d.x - np.inf, 0 * d.x + np.inf
+    for k in range(first, first + count):
         normal = splat3(extra, k, 0)
         height = extra[k, 3] - dot(normal, o)       # how far behind the plane the ray starts
         speed = dot(normal, d)
@@ -115,11 +114,10 @@ def hit_solid(rays, i, p, data, q, extra, side, opacity):
         # a ray along the plane is never behind it if it starts before it
         enter = select(speed < 0, greatest(t, enter), select((speed == 0) & (height < 0), np.inf, enter))
         leave = select(speed > 0, least(t, leave), leave)
-    if side == 0:
-        t = select(enter > start, enter, leave)
-    else:
-        t = enter if side & 1 else leave
-    record(rays, i, p, t, (enter <= leave) & (t < np.inf), opacity)
+    t = select(enter > wide(start), enter, leave)
+    if side != 0:
+        t = enter if side & FRONT else leave
+    return rounded(t, start), (enter <= leave) & (t < np.inf)
 
 
 @kernel
@@ -130,9 +128,12 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
-                        hit_solid(rays, start + g * 8, first + q, table.data, q, table.extra, table.side[q], opacity)
+                        i = start + g * 8
+                        t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, table.side[q])
+                        record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -140,8 +141,10 @@ def intersect(rays, n, tree, table, first, opacity):
 @kernel
 def intersect_open(rays, n, tree, table, first, opacity):
     for q in range(table.data.shape[0]):
+        begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
         for i in range(0, n, 8):
-            hit_solid(rays, i, first + q, table.data, q, table.extra, table.side[q], opacity)
+            t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, table.side[q])
+            record(rays, i, first + q, t, ok, opacity)
 
 
 @kernel
