@@ -7,7 +7,8 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QSizePolicy, QToolBut
 
 from app.bindings import Binding
 from app.editors import ChoiceEdit, ColorEdit, Editor, FlagEdit, GridEdit, MaybeEdit, SliderEdit, Summary, TextEdit
-from rtcore.fields import Choice, Color, Field, FieldError, Flag, Maybe, Number, Numbers, Record, Text, Vector, Vectors, fields_of
+from app.formula import FormulaEdit
+from rtcore.fields import Choice, Color, Field, FieldError, Flag, Formula, Maybe, Number, Numbers, Record, Text, Vector, Vectors, fields_of
 
 MOST_ROWS = 12      # of a list of points that is edited in place
 
@@ -43,6 +44,8 @@ def editor_for(field: Field, value: object) -> Editor:
         return FlagEdit()
     if isinstance(field, Choice):
         return ChoiceEdit(field.words)
+    if isinstance(field, Formula):
+        return FormulaEdit()
     if isinstance(field, Text):
         return TextEdit()
     if isinstance(field, Vectors) and 0 < len(value) <= MOST_ROWS:

@@ -26,8 +26,8 @@ def stem(request) -> str:
 
 
 def test_the_gallery_has_the_scenes_that_were_promised():
-    promised = {"blobs", "candle", "chess", "coloured-fog", "fog-depth", "koppelaarster", "quadrics", "rembrandt", "snail", "solids",
-                "spheres", "tori", "transformed-spheres", "whitted"}
+    promised = {"barth-sextic", "blobs", "candle", "chess", "coloured-fog", "fog-depth", "gyroid", "heart", "koppelaarster", "quadrics",
+                "rembrandt", "snail", "solids", "spheres", "tori", "transformed-spheres", "whitted"}
     assert promised <= {path.stem for path in GALLERY}
 
 
