@@ -17,8 +17,9 @@ import numpy as np
 from rtcore.expansions import LONG, expand, put_product, put_products
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, greatest, least, narrow, root, select, size, wide
-from rtcore.pairs import add, multiply, scale, square, two_product
+from rtcore.pairs import add, multiply, square, two_product
 from rtcore.shapes._ball import U64, advance
+from rtcore.shapes._separate import between, stationary_of, value_at
 from rtcore.shapes._unit import BEYOND, line_expanded
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import SLOW, START, record_one
@@ -187,15 +188,8 @@ def settle(rays, i, p, table, q, opacity):
         step = quartic_about(f, v, s, s1, exact[q, RADII], exact[q, RADII + 1], form) / speed2
         s, s1 = add(s, s1, -step, 0.0)
     quartic_about(f, v, s, s1, exact[q, RADII], exact[q, RADII + 1], form)
-    # the derivatives' roots, from the third on: each one's separate those of the one before
-    poly, stop, local, count = np.empty((5, 2)), np.empty((5, 2)), np.empty((5, LONG)), 0
-    for order in (3, 2, 1):
-        for k in range(5 - order):
-            factor = 1.0
-            for j in range(order):
-                factor *= k + order - j
-            poly[k, 0], poly[k, 1] = scale(form[k + order, 0], form[k + order, 1], factor)
-        count = separate(poly, 4 - order, reach, stop, count)
+    poly, stop, local = np.empty((5, 2)), np.empty((5, 2)), np.empty((5, LONG))
+    count = stationary_of(form, -reach, reach, poly, stop)
     poly[:, :] = form[:, :2]
     now, lo, lo1, touch, touch1 = 1.0, -reach, 0.0, np.nan, 0.0
     for j in range(count + 1):
@@ -265,16 +259,6 @@ def put_dot(terms, n, a, b, count):
     return n
 
 
-@inline
-def value_at(poly, degree, x, x1):
-    """A polynomial of pairs at a pair."""
-    y, y1 = poly[degree, 0], poly[degree, 1]
-    for k in range(degree - 1, -1, -1):
-        y, y1 = multiply(y, y1, x, x1)
-        y, y1 = add(y, y1, poly[k, 0], poly[k, 1])
-    return y, y1
-
-
 @kernel
 def sign_at(form, poly, x, x1):
     """The sign of the quartic at a pair; 0 where it is less than TOUCH. By expansions where pairs can't tell."""
@@ -288,45 +272,3 @@ def sign_at(form, poly, x, x1):
         terms[n:n + LONG] = form[k]
         expand(terms, n + LONG, total)
     return np.sign(total[0]) if abs(total[0]) > TOUCH else 0.0
-
-
-@kernel
-def separate(poly, degree, reach, stop, count):
-    """Replace the `count` places in `stop` between which a polynomial of pairs is monotonic by its roots, ascending; returns how many."""
-    out_of_line()
-    lo, lo1, found = -reach, 0.0, 0
-    before = value_at(poly, degree, lo, lo1)[0] > 0
-    for j in range(count + 1):
-        hi, hi1 = (stop[j, 0], stop[j, 1]) if j < count else (reach, 0.0)
-        after = value_at(poly, degree, hi, hi1)[0] > 0
-        if before != after:
-            stop[found, 0], stop[found, 1] = between(poly, degree, lo, lo1, hi, hi1, after)
-            found += 1
-        lo, lo1, before = hi, hi1, after
-    return found
-
-
-@kernel
-def between(poly, degree, lo, lo1, hi, hi1, rising):
-    """The root of a polynomial of pairs between two places, where it changes its sign once: bracketed Newton, as a pair."""
-    out_of_line()
-    x, x1 = add(0.5 * lo, 0.5 * lo1, 0.5 * hi, 0.5 * hi1)
-    last = hi - lo
-    for _ in range(300):
-        y = value_at(poly, degree, x, x1)[0]
-        if y == 0 or not last > 2.0 ** -108:
-            break
-        if (y < 0) == rising:
-            lo, lo1 = x, x1
-        else:
-            hi, hi1 = x, x1
-        slope = 0.0
-        for k in range(degree, 0, -1):
-            slope = slope * x + k * poly[k, 0]
-        x, x1 = add(x, x1, -y / slope, 0.0)
-        if abs(y) <= 0.5 * last * abs(slope) and add(x, x1, -lo, -lo1)[0] >= 0 and add(hi, hi1, -x, -x1)[0] >= 0:
-            last = abs(y / slope)
-        else:
-            x, x1 = add(0.5 * lo, 0.5 * lo1, 0.5 * hi, 0.5 * hi1)
-            last = 0.5 * add(hi, hi1, -lo, -lo1)[0]
-    return x, x1
