@@ -4,21 +4,29 @@ With the origin at the closest approach to the blob's middle, an element's field
 m ± h of its span, 0 elsewhere. The ends of all spans cut the ray into stretches; in each the field is one quartic, summed afresh from
 the elements active there: w as a quadratic in Bernstein form, whose square is one in Bernstein form, so nothing is converted and
 nothing cancels. Signs of the coefficients exclude and isolate; where they can't, those of their differences isolate the only turning
-point, else the piece is cut in two. Roots are found on the sum of the elements' fields, not on the polynomial.
+point, else the piece is cut in two. Roots are found on the sum of the elements' fields, not on the polynomial. All signs that matter
+are beyond a bound on their rounding; a ray for which they aren't is left to `_softly.py`.
 """
 from typing import NamedTuple
 
 import numpy as np
 
 from rtcore.jit import inline
+from rtcore.pairs import add, divide, scale, square, two_product
+from rtcore.shapes._ball import advance
 from rtcore.shapes.kind import BACK, FRONT
 
 MOST_ELEMENTS = 256
 DEEPEST = 48                    # pieces that wait; a stretch cut so often has nothing left to find but rounding
 SPLIT = 0.46875                 # where a piece is cut: not in the middle, in which symmetric things have their double roots
-NOISE = 2.0 ** -51              # rounding of the summed field, as a share of threshold + sum of |strength| w
+NOISE = 2.0 ** -51              # rounding of the summed field, as a share of threshold + sum of |strength| w (1 + 4 / radius)
+TINY = 2.0 ** -45               # pieces are not cut to less, in lengths of the blob
 X, Y, Z, RADIUS, STRENGTH, PARTS = 0, 1, 2, 3, 4, 5     # of an element; in a table, what float32 leaves of each part follows
-MIDDLE, HALF2, RADIUS2, WEIGHT = 0, 1, 2, 3     # of a span
+MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ = 0, 1, 2, 3, 4       # of a span; the last: by how much w is to be multiplied for NOISE
+#: Of a ray: closest approach to the middle, unit direction, speed, t of the closest approach and what that lacks; origin and direction
+#: as pairs, high parts first.
+POINT, ALONG, SPEED, SHIFT, MORE, FROM, WAY, LINE_ROWS = 0, 3, 6, 7, 8, 9, 15, 21
+MISS, HIT, UNSURE = 0, 1, 2         # what a search comes to
 LO, HI, RISES = 5, 6, 7         # of a piece, after its five coefficients; RISES 0: not known to hold just one root
 
 
@@ -26,19 +34,20 @@ class Scratch(NamedTuple):
     """What the search along one ray works on; made once per kernel call."""
 
     element: np.ndarray     # float64 (n, 5): the blob at hand
-    span: np.ndarray        # float64 (n, 4): of the elements that the ray meets, see MIDDLE ..
+    span: np.ndarray        # float64 (n, 5): of the elements that the ray meets, see MIDDLE ..
     end: np.ndarray         # float64 (2 n): where spans begin and end, ascending
     whose: np.ndarray       # int64 (2 n): number k of the span that begins there, ~k of the one that ends
     active: np.ndarray      # int64 (n): spans that cover the stretch at hand
     piece: np.ndarray       # float64 (m, 8): stack of pieces of the stretch
     found: np.ndarray       # P (1, 8): t of eight rays
+    line: np.ndarray        # float64 (rows, 8): eight rays in unit space, see POINT ..
 
 
 @inline
 def new_scratch(rays):
-    return Scratch(np.empty((MOST_ELEMENTS, 5)), np.empty((MOST_ELEMENTS, 4)), np.empty(2 * MOST_ELEMENTS + 1),
+    return Scratch(np.empty((MOST_ELEMENTS, 5)), np.empty((MOST_ELEMENTS, 5)), np.empty(2 * MOST_ELEMENTS + 1),
                    np.empty(2 * MOST_ELEMENTS, np.int64), np.empty(MOST_ELEMENTS, np.int64), np.empty((DEEPEST + 4, 8)),
-                   np.empty((1, 8), rays.ray.dtype))
+                   np.empty((1, 8), rays.ray.dtype), np.empty((LINE_ROWS, 8)))
 
 
 @inline
@@ -55,6 +64,7 @@ def meet(scratch, count, nx, ny, nz, ex, ey, ez, low):
             h = np.sqrt(square)
             if h - b > low:
                 span[m, MIDDLE], span[m, HALF2], span[m, RADIUS2], span[m, WEIGHT] = -b, square, r * r, element[k, STRENGTH]
+                span[m, FUZZ] = abs(element[k, STRENGTH]) * (1 + 4 / r)
                 for side in range(2):
                     at = -b - h if side == 0 else -b + h
                     j = 2 * m + side
@@ -118,22 +128,43 @@ def count_turns(a, b, c, d):
 
 
 @inline
-def accept(found, lane, t, start):
-    """Whether t, rounded to the ray's precision, is past its start; if so it is kept."""
+def keep(found, lane, t, start):
+    """Keeps t, rounded to the ray's precision: HIT if it is past the ray's start, else UNSURE."""
     found[0, lane] = t
-    if found[0, lane] > start:
-        return True
-    found[0, lane] = np.inf
-    return False
+    return HIT if found[0, lane] > start else UNSURE
 
 
 @inline
-def search(scratch, m, threshold, low, shift, speed, start, far, side, lane):
-    """The first crossing past `start` among m spans, as scratch.found[0, lane]: t = (s + shift) / speed; inf if there is none."""
+def begins_inside(scratch, count, threshold, lane, start):
+    """The sign of the field where ray `lane` starts, in double-double; 0 if even that can't tell."""
+    line, element = scratch.line, scratch.element
+    total, total1, size = -threshold, 0.0, threshold
+    x, x1 = advance(line[FROM, lane], line[FROM + 3, lane], start, line[WAY, lane], line[WAY + 3, lane])
+    y, y1 = advance(line[FROM + 1, lane], line[FROM + 4, lane], start, line[WAY + 1, lane], line[WAY + 4, lane])
+    z, z1 = advance(line[FROM + 2, lane], line[FROM + 5, lane], start, line[WAY + 2, lane], line[WAY + 5, lane])
+    for k in range(count):
+        a, a1 = square(*add(x, x1, -element[k, X], 0.0))
+        b, b1 = square(*add(y, y1, -element[k, Y], 0.0))
+        a, a1 = add(a, a1, b, b1)
+        b, b1 = square(*add(z, z1, -element[k, Z], 0.0))
+        a, a1 = add(a, a1, b, b1)
+        b, b1 = two_product(element[k, RADIUS], element[k, RADIUS])
+        a, a1 = add(b, b1, -a, -a1)
+        if a > 0:
+            a, a1 = divide(a, a1, b, b1)
+            size += abs(element[k, STRENGTH]) * a * (1 + 4 / element[k, RADIUS])
+            a, a1 = scale(*square(a, a1), element[k, STRENGTH])
+            total, total1 = add(total, total1, a, a1)
+    return np.sign(total) if abs(total) > 2.0 ** -96 * size else 0.0
+
+
+@inline
+def search(scratch, count, m, threshold, low, shift, more, speed, start, far, side, lane):
+    """The first crossing past `start` among m spans, as scratch.found[0, lane]: t = shift + (more + s / speed). HIT, MISS or UNSURE."""
     end, piece, found = scratch.end, scratch.piece, scratch.found
-    rising, falling = side == 0 or side & FRONT != 0, side == 0 or side & BACK != 0
+    rising, falling = side & (FRONT | BACK) == 0 or side & FRONT != 0, side & (FRONT | BACK) == 0 or side & BACK != 0
     end[2 * m] = end[2 * m - 1] + 1
-    inside, touching, n = False, False, 0
+    inside, edge, n = False, 0.0, 0     # edge: +-1 where the field rises or falls through a value too small for its sign to be certain
     for j in range(2 * m):
         k = scratch.whose[j]
         if k >= 0:
@@ -148,29 +179,30 @@ def search(scratch, m, threshold, low, shift, speed, start, far, side, lane):
         a, b = max(end[j], low), end[j + 1]
         if not b > a:
             continue
-        found[0, lane] = (a + shift) / speed
+        found[0, lane] = shift + (more + a / speed)
         if found[0, lane] > far:
-            break
+            return MISS
         c0, c1, c2, c3, c4, noise = -threshold, -threshold, -threshold, -threshold, -threshold, threshold
         for i in range(n):
             k = scratch.active[i]
             u, v = a - scratch.span[k, MIDDLE], b - scratch.span[k, MIDDLE]
-            half2, square, weight = scratch.span[k, HALF2], scratch.span[k, RADIUS2], scratch.span[k, WEIGHT]
-            w0, w1, w2 = max(half2 - u * u, 0.0) / square, (half2 - u * v) / square, max(half2 - v * v, 0.0) / square
+            half2, square2, weight = scratch.span[k, HALF2], scratch.span[k, RADIUS2], scratch.span[k, WEIGHT]
+            w0, w1, w2 = max(half2 - u * u, 0.0) / square2, (half2 - u * v) / square2, max(half2 - v * v, 0.0) / square2
             c0 += weight * w0 * w0
             c1 += weight * w0 * w1
             c2 += weight * (w0 * w2 + 2 * w1 * w1) / 3
             c3 += weight * w1 * w2
             c4 += weight * w2 * w2
-            noise += abs(weight) * max(w0, max(w1, w2))
-        noise *= NOISE
+            noise += scratch.span[k, FUZZ] * max(w0, max(w1, w2))
+        noise *= 2 * NOISE
         if end[j] <= low:
-            inside = c0 > 0
-        elif (touching and abs(c0) <= noise and abs(c2) > noise and (c2 > 0) == inside      # just where two stretches meet
-                and accept(found, lane, (a + shift) / speed, start)):
-            return
-        touching = abs(c4) <= noise
-        if not inside and max(max(c0, c1), max(max(c2, c3), c4)) <= 0:
+            edge, inside = 0.0, c0 > 0
+            if abs(c0) <= 2 * noise:
+                c0 = begins_inside(scratch, count, threshold, lane, start) * noise
+                if c0 == 0:
+                    return UNSURE
+                inside = c0 > 0
+        if not inside and edge == 0 and max(max(c0, c1), max(max(c2, c3), c4)) < -noise:
             continue
         piece[0, 0], piece[0, 1], piece[0, 2], piece[0, 3], piece[0, 4] = c0, c1, c2, c3, c4
         piece[0, LO], piece[0, HI], piece[0, RISES] = a, b, 0.0
@@ -180,51 +212,65 @@ def search(scratch, m, threshold, low, shift, speed, start, far, side, lane):
             c0, c1, c2, c3, c4 = piece[top, 0], piece[top, 1], piece[top, 2], piece[top, 3], piece[top, 4]
             lo, hi, rises = piece[top, LO], piece[top, HI], piece[top, RISES]
             if rises == 0:
-                before, after = c0 > 0, c4 > 0
-                if before != inside:        # the roundings of two stretches differ where they meet: there it crosses
-                    inside = before
-                    if (rising if before else falling) and accept(found, lane, (lo + shift) / speed, start):
-                        return
-                changes = (before != (c1 > 0)) + ((c1 > 0) != (c2 > 0)) + ((c2 > 0) != (c3 > 0)) + ((c3 > 0) != after)
-                if changes == 0:
+                lowest = min(min(c0, c1), min(min(c2, c3), c4))
+                highest = max(max(c0, c1), max(max(c2, c3), c4))
+                d0, d1, d2, d3 = c1 - c0, c2 - c1, c3 - c2, c4 - c3
+                least, most = min(min(d0, d1), min(d2, d3)), max(max(d0, d1), max(d2, d3))
+                slope = 1.0 if least > 4 * noise else -1.0 if most < -4 * noise else 0.0
+                sharp = min(min(abs(c0), abs(c1)), min(min(abs(c2), abs(c3)), abs(c4))) > noise
+                after = c4 > 0
+                if lowest > noise or highest < -noise:
+                    if after != inside:         # it has crossed where the sign was not certain
+                        if edge == 0 or (edge > 0) != after:
+                            return UNSURE
+                        inside = after
+                        if rising if after else falling:
+                            return keep(found, lane, shift + (more + lo / speed), start)
+                    edge = 0.0
                     continue
-                if changes == 1:
+                if slope != 0:
+                    if edge * slope < 0 or edge == 0 and (c0 > 0) != inside:
+                        return UNSURE
+                    edge = slope if abs(c4) <= noise else 0.0
+                    if after == inside:
+                        continue
+                    if after != (slope > 0):
+                        return UNSURE
+                    rises = slope
+                elif sharp and edge == 0 and (c0 > 0) == inside and after != inside and (
+                        (inside != (c1 > 0)) + ((c1 > 0) != (c2 > 0)) + ((c2 > 0) != (c3 > 0)) + ((c3 > 0) != after) == 1):
                     rises = 1.0 if after else -1.0
                 else:
-                    turns = count_turns(c1 - c0, c2 - c1, c3 - c2, c4 - c3)
                     middle = lo + SPLIT * (hi - lo)
-                    flat = max(max(abs(c0), abs(c1)), max(max(abs(c2), abs(c3)), abs(c4))) <= noise
-                    d0, d1, d2, d3 = c0 + SPLIT * (c1 - c0), c1 + SPLIT * (c2 - c1), c2 + SPLIT * (c3 - c2), c3 + SPLIT * (c4 - c3)
-                    e0, e1, e2 = d0 + SPLIT * (d1 - d0), d1 + SPLIT * (d2 - d1), d2 + SPLIT * (d3 - d2)
-                    g0, g1 = e0 + SPLIT * (e1 - e0), e1 + SPLIT * (e2 - e1)
-                    h = g0 + SPLIT * (g1 - g0)
-                    # a crossing in view, or more than one turning point
-                    if not flat and ((h > 0) != before or turns > 1) and top < DEEPEST and lo < middle < hi:
-                        piece[top, 0], piece[top, 1], piece[top, 2], piece[top, 3], piece[top, 4] = h, g1, e2, d3, c4
+                    e0, e1, e2, e3 = c0 + SPLIT * d0, c1 + SPLIT * d1, c2 + SPLIT * d2, c3 + SPLIT * d3
+                    g0, g1, g2 = e0 + SPLIT * (e1 - e0), e1 + SPLIT * (e2 - e1), e2 + SPLIT * (e3 - e2)
+                    h0, h1 = g0 + SPLIT * (g1 - g0), g1 + SPLIT * (g2 - g1)
+                    h = h0 + SPLIT * (h1 - h0)
+                    only = (edge == 0 and min(abs(c0), abs(c4)) > noise and (h > 0) == inside and after == inside
+                            and min(min(abs(d0), abs(d1)), min(abs(d2), abs(d3))) > 2 * noise and count_turns(d0, d1, d2, d3) == 1)
+                    if not only:
+                        if top >= DEEPEST or not hi - lo > TINY:
+                            return UNSURE
+                        piece[top, 0], piece[top, 1], piece[top, 2], piece[top, 3], piece[top, 4] = h, h1, g2, e3, c4
                         piece[top, LO], piece[top, HI], piece[top, RISES] = middle, hi, 0.0
                         top += 1
-                        piece[top, 0], piece[top, 1], piece[top, 2], piece[top, 3], piece[top, 4] = c0, d0, e0, g0, h
+                        piece[top, 0], piece[top, 1], piece[top, 2], piece[top, 3], piece[top, 4] = c0, e0, g0, h0, h
                         piece[top, LO], piece[top, HI], piece[top, RISES] = lo, middle, 0.0
                         top += 1
                         continue
-                    f = 0.0
-                    if not flat and turns == 1:
-                        middle = solve(scratch, n, threshold, lo, hi, before, 1)
-                        f = field(scratch, n, threshold, middle)[0]
-                    if abs(f) <= noise:     # it touches: a double root, in and out
-                        inside = after
-                        if accept(found, lane, (middle + shift) / speed, start):
-                            return
+                    # one turning point; no crossing in view
+                    middle = solve(scratch, n, threshold, lo, hi, inside, 1)
+                    f = field(scratch, n, threshold, middle)[0]
+                    if abs(f) <= 4 * noise:
+                        return UNSURE
+                    if (f > 0) == inside:
                         continue
-                    if (f > 0) == before:
-                        continue
-                    rises = -1.0 if before else 1.0
+                    rises = -1.0 if inside else 1.0
                     piece[top, LO], piece[top, HI], piece[top, RISES] = middle, hi, -rises
                     top += 1
                     hi = middle
             inside = rises > 0
             if rising if inside else falling:
                 s = solve(scratch, n, threshold, lo, hi, inside, 0)
-                if accept(found, lane, (s + shift) / speed, start):
-                    return
-    found[0, lane] = np.inf
+                return keep(found, lane, shift + (more + s / speed), start)
+    return MISS

@@ -1,16 +1,22 @@
 """Blob: soft spheres that flow together (Wyvill, McPheeters and Wyvill, *Data Structure for Soft Objects*, 1986)."""
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Field, FieldError, Number, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import load
+from rtcore.lanes import along, dot, greatest, load, root, size, store, vec3
 from rtcore.scene import Shape, invertible
-from rtcore.shapes._blob import MOST_ELEMENTS, NOISE, PARTS, RADIUS, STRENGTH, X, Y, Z, meet, new_scratch, search
-from rtcore.shapes.kind import OWN, REACH, Kind, Packed, around, forward, into1, normalized, placed, put_placed, unit_hit
-from rtcore.wave import DX, ERR, OX, START, T, U, record
+from rtcore.shapes._ball import advance, lowest
+from rtcore.shapes._blob import (ALONG, FROM, HIT, MISS, MORE, MOST_ELEMENTS, NOISE, PARTS, POINT, RADIUS, SHIFT, SPEED, STRENGTH, UNSURE,
+                                 WAY, X, Y, Z, meet, new_scratch, search)
+from rtcore.shapes._softly import settle
+from rtcore.shapes._unit import line_in_pairs
+from rtcore.shapes.kind import OWN, REACH, Kind, Packed, around, forward, normalized, placed, put_placed, unit_hit
+from rtcore.wave import ERR, START, T, U, record
 
 LEAST, MOST = 1e-30, 1e30       # radii of a unit blob's elements; smaller ones can't be seen, larger ones can't be told from these
 LONGEST = 0.05                  # step toward the surface, in a unit blob
@@ -66,13 +72,14 @@ class Blob(Shape, frozen=True):
             # scale a power of two and the middle of few digits: the elements keep theirs
             middle = np.round((low / 2 + high / 2) / scale * 2.0 ** 20) * 2.0 ** -20 * scale
             local = matrix @ np.array([[scale, 0, 0, middle[0]], [0, scale, 0, middle[1]], [0, 0, scale, middle[2]], [0, 0, 0, 1]])
-            inverse = invertible(local)
+            back = invertible(local)
             unit = np.column_stack([centers / scale - middle / scale, radii / scale])
             unit *= np.minimum(1, MOST / unit[:, 3:])
             strong = np.ldexp(1.0, -np.frexp(np.abs(strengths).max())[1])
             rows = np.column_stack([unit, strengths * strong])[(unit[:, 3] >= LEAST) & (strengths != 0)]
             extra = np.column_stack(halves(rows))
-        return Packed(BLOB, placed(local, inverse, *halves(self.threshold * strong), 0.0, len(rows))[None], extra)
+        exact = [*parts(moved(matrix, middle), 3), *parts([x / Fraction(scale) for row in inverse(matrix) for x in row], 3)]
+        return Packed(BLOB, placed(local, back, *halves(self.threshold * strong), 0.0, len(rows))[None], extra, exact=np.array([exact]))
 
 
 def halves(x):
@@ -92,28 +99,51 @@ def take_elements(element, data, q, extra):
 
 
 @inline
-def hit_blob(rays, i, lane, data, q, scratch, count, threshold, side):
-    """One ray against the elements in `scratch`."""
-    ray = rays.ray
-    start, far = ray[START, i], ray[T, i]
+def take_lines(ray, i, exact, q, line):
+    """Eight rays in the unit space of blob q, about their closest approach to its middle; see `_blob.POINT`."""
+    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+    longest = greatest(size(v.x), greatest(size(v.y), size(v.z)))
+    e = v * (1 / longest)
+    square = dot(e, e)
+    shift = -dot(f, e) / square / longest
+    nx, ny, nz = (advance(f.x, f1.x, shift, v.x, v1.x)[0], advance(f.y, f1.y, shift, v.y, v1.y)[0],
+                  advance(f.z, f1.z, shift, v.z, v1.z)[0])
+    more = -dot(vec3(nx, ny, nz), e) / square       # what the rounding of the shift left
+    n = along(vec3(nx, ny, nz), more, e)
+    inverse = 1 / root(square)
+    put(line, POINT, n)
+    put(line, ALONG, e * inverse)
+    store(line, SPEED, 0, longest / inverse)
+    store(line, SHIFT, 0, shift)
+    store(line, MORE, 0, more / longest)
+    put(line, FROM, f)
+    put(line, FROM + 3, f1)
+    put(line, WAY, v)
+    put(line, WAY + 3, v1)
+
+
+@inline
+def put(line, row, v):
+    """Three rows of eight."""
+    store(line, row, 0, v.x)
+    store(line, row + 1, 0, v.y)
+    store(line, row + 2, 0, v.z)
+
+
+@inline
+def hit_blob(rays, i, lane, scratch, count, threshold, side):
+    """One ray against the elements in `scratch`: HIT, MISS or UNSURE."""
+    ray, line = rays.ray, scratch.line
+    start, far = np.float64(ray[START, i]), ray[T, i]
     scratch.found[0, lane] = np.inf
     if not far > start:
-        return
-    x, y, z = into1(data, q, np.float64(ray[OX, i]) - data[q, 0], np.float64(ray[OX + 1, i]) - data[q, 1],
-                    np.float64(ray[OX + 2, i]) - data[q, 2])
-    ex, ey, ez = into1(data, q, np.float64(ray[DX, i]), np.float64(ray[DX + 1, i]), np.float64(ray[DX + 2, i]))
-    longest = max(abs(ex), max(abs(ey), abs(ez)))
-    ex, ey, ez = ex / longest, ey / longest, ez / longest
-    length = np.sqrt(ex * ex + ey * ey + ez * ez)
-    ex, ey, ez, speed = ex / length, ey / length, ez / length, length * longest
-    shift = 0.0
-    for _ in range(2):      # the closest approach once more: what the first step's rounding left
-        step = -(x * ex + y * ey + z * ez)
-        x, y, z, shift = x + step * ex, y + step * ey, z + step * ez, shift + step
-    low = start * speed - shift
-    m = meet(scratch, count, x, y, z, ex, ey, ez, low)
-    if m > 0:
-        search(scratch, m, threshold, low, shift, speed, start, far, side, lane)
+        return MISS
+    speed, shift, more = line[SPEED, lane], line[SHIFT, lane], line[MORE, lane]
+    low = ((start - shift) - more) * speed
+    m = meet(scratch, count, line[0, lane], line[1, lane], line[2, lane], line[3, lane], line[4, lane], line[5, lane], low)
+    if m == 0:
+        return MISS
+    return search(scratch, count, m, threshold, low, shift, more, speed, start, far, side, lane)
 
 
 @kernel
@@ -129,11 +159,21 @@ def intersect(rays, n, tree, table, first, opacity):
                 threshold = np.float64(data[q, THRESHOLD]) + np.float64(data[q, THRESHOLD + 1])
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
-                        i = start + g * 8
+                        i, hit, late = start + g * 8, 0, 0
+                        take_lines(rays.ray, i, table.exact, q, scratch.line)
                         for lane in range(8):
-                            hit_blob(rays, i + lane, lane, data, q, scratch, count, threshold, table.side[q])
-                        t = load(scratch.found, 0, 0)
-                        record(rays, i, first + q, t, t < np.inf, opacity)
+                            result = hit_blob(rays, i + lane, lane, scratch, count, threshold, table.side[q])
+                            if result != HIT:
+                                scratch.found[0, lane] = np.inf
+                            hit |= int(result == HIT) << lane
+                            late |= int(result == UNSURE) << lane
+                        if hit:
+                            t = load(scratch.found, 0, 0)
+                            record(rays, i, first + q, t, t < np.inf, opacity)
+                        while late:
+                            settle(rays, i + lowest(late), first + q, table.exact, q, scratch.element, count, threshold, table.side[q],
+                                   opacity)
+                            late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
