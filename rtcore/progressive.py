@@ -249,10 +249,13 @@ class Renderer:
         """The last request in the form of the command line's --stats, without what only the caller knows."""
         render = self._render
         settings = render.settings
+        slow, uncertified = (int(x) for x in sum(scratch.tally() for scratch in render.scratches))
+        traced = sum(count for name, count in render.rays().items() if not name.endswith("hits"))
         left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
         return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),
                 "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed},
+                "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified_hits": uncertified,
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
                 "error": {"rmse_estimate": films.rmse_estimate(render.film)}}

@@ -35,6 +35,7 @@ class Scratch:
     def __init__(self, dtype):
         self.dtype = dtype
         self.counts = np.zeros(len(COUNTS), np.int64)
+        self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
         self.waves: list[Wave] = []
         self.beam = new_beam(0, dtype)
         self.target = np.zeros(0, np.int32)
@@ -45,6 +46,7 @@ class Scratch:
         while len(self.waves) <= level:
             self.waves.append(new_wave(0, self.dtype))
         if self.waves[level].owner.shape[0] < n:
+            self.tallied += self.waves[level].rays.tally
             self.waves[level] = new_wave(n * 5 // 4, self.dtype)
         return self.waves[level]
 
@@ -54,9 +56,14 @@ class Scratch:
             self.target, self.sample = np.empty(n, np.int32), np.empty((3, n), np.float32)
         return self.wave(0, n)
 
+    def tally(self) -> np.ndarray:
+        """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
+        return sum((wave.rays.tally for wave in self.waves), self.tallied + self.beam.rays.tally)
+
     def beams(self, n: int):
         """A beam with room for n shadow rays."""
         if self.beam.owner.shape[0] < n:
+            self.tallied += self.beam.rays.tally
             self.beam = new_beam(n * 5 // 4, self.dtype)
         return self.beam
 
