@@ -218,6 +218,10 @@ def march(code, search, rays, n, side, single, found, doubt, roots):
             low, high, d, d1 = at[VALUE, k], at[VALUE + 1, k], at[SLOPE, k], at[SLOPE + 1, k]
             tries = state[TRIES, k] + 1
             state[TRIES, k] = tries
+            if tries > 8 * PATIENCE:        # it gives up
+                waiting = begin(search, rays, n, waiting, k)
+                live -= whose[k] < 0
+                continue
             hit, proven, s, facing = False, True, 0.0, 0.0
             if tries == 0:      # the first look: whether it starts on the surface
                 begin_at(state, k, a, f1, 0.25 * (state[END, k] - a))
