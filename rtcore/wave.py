@@ -52,6 +52,12 @@ def new_rays(n: int, dtype) -> Rays:
 
 
 @inline
+def alive(ray, i):
+    """Lanes i .. i+7 whose interval is not empty: rays that have ended are in the same vector as others."""
+    return load(ray, T, i) > load(ray, START, i)
+
+
+@inline
 def record(rays, i, p, t, ok, opacity):
     """Lanes i .. i+7 meet primitive p at t where ok. Without opacities the nearest hit is kept, and of equally near ones that of the
     lower number, so that no order of the walk shows; with them (shadow rays) an opaque hit ends the ray, others add up."""

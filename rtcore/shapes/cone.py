@@ -20,7 +20,7 @@ from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
 from rtcore.shapes._second import BOX, CENTER, FORM, IN_SLAB, INTO, approach, form_of, heights, into_pairs, line_form, may_meet, ray_parts
 from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, around, forward, placed, put_placed, unit_hit
-from rtcore.wave import DX, OX, SLOW, START, T, record, record_one
+from rtcore.wave import DX, OX, SLOW, START, T, alive, record, record_one
 
 #: Columns after the placing: radius at z = 0 and what it grows by; whether there are caps below and above; the largest number of L, that of
 #: the form's second-degree part, how far the frustum reaches from its middle in the form's units.
@@ -140,7 +140,7 @@ def near_cap(ray, i, exact, q, near, end):
     grow = 1 + extent(p)
     slack = 32 * U64 * (extent(e) * near.far / size(rise) + size(t))
     out = form > 64 * U64 * (near.far + 1) * grow + 4 * grow * near.speed * slack
-    return ~(out | (t + slack < wide(load(ray, START, i))) | (t - slack > wide(load(ray, T, i))))
+    return alive(ray, i) & ~(out | (t + slack < wide(load(ray, START, i))) | (t - slack > wide(load(ray, T, i))))
 
 
 @inline
@@ -233,7 +233,7 @@ def intersect(rays, n, tree, table, first, opacity):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
                         near = approach(rays.ray, i, table.exact, q, most, curved)
-                        todo = may_meet(near)
+                        todo = may_meet(near) & alive(rays.ray, i)
                         late = 0
                         if any_lane(todo):
                             t, found, unsure = _second.meet(rays.ray, i, table.exact, q, most, IN_SLAB, limit, todo, near, table.side[q])

@@ -28,7 +28,7 @@ class Table(NamedTuple):
     """The primitives of one kind: rows of numbers in precision P, further rows (normals, outlines), and which sides are visible."""
 
     data: np.ndarray    # P (n, w)
-    extra: np.ndarray   # P (m, k)
+    extra: np.ndarray   # P (m, k); float64 for kinds with `shared_extra`
     side: np.ndarray    # int8 (n)
     exact: np.ndarray   # float64 (n, k), whatever P is: numbers, mostly as pairs, from which a kernel can work out a certain answer
 

@@ -52,7 +52,7 @@ def approach(ray, i, exact, q):
     # no number of the normal is above 1; the point is known to a rounding, also where it is far away
     slack = 2.0 ** -20 * size(t) + 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT))) / size(speed)
     start, end = wide(load(ray, START, i)), wide(load(ray, T, i))
-    return (size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end))
+    return (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
 
 
 @inline

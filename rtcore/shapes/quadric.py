@@ -19,7 +19,7 @@ from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, INTO, approach, may_meet, meet, settle
 from rtcore.shapes.kind import OWN, Kind, Packed, around, forward, normalized, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import record
+from rtcore.wave import alive, record
 
 #: Columns after the placing: the form, the box's corners, the largest number of L, that of the form's second-degree part.
 LOW, HIGH, MOST = OWN + 10, OWN + 13, OWN + 16
@@ -89,7 +89,7 @@ def intersect(rays, n, tree, table, first, opacity):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
                         near = approach(rays.ray, i, table.exact, q, most, curved)
-                        todo = may_meet(near)
+                        todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
                             t, found, unsure = meet(rays.ray, i, table.exact, q, most, IN_BOX, 2.0, todo, near, table.side[q])
                             record(rays, i, first + q, t, found, opacity)
@@ -107,7 +107,7 @@ def intersect_open(rays, n, tree, table, first, opacity):
         most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
         for i in range(0, n, 8):
             near = approach(rays.ray, i, table.exact, q, most, curved)
-            todo = may_meet(near)
+            todo = may_meet(near) & alive(rays.ray, i)
             if any_lane(todo):
                 t, found, unsure = meet(rays.ray, i, table.exact, q, most, EVERYWHERE, 2.0, todo, near, table.side[q])
                 record(rays, i, first + q, t, found, opacity)

@@ -21,7 +21,7 @@ from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
 from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, unit_hit)
-from rtcore.wave import DX, OX, START, T, U, record
+from rtcore.wave import DX, OX, START, T, U, alive, record
 
 
 #: Ellipsoids: column of the largest number of the matrix L into unit space; where L's parts begin in Table.exact, after the centre's.
@@ -127,7 +127,7 @@ def intersect(rays, n, tree, table, first, opacity):
                     i = start + g * 8
                     if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
                         far, near = approach(rays.ray, i, table.data, table.exact, q)
-                        todo = may_meet(near)
+                        todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
                             t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
                             record(rays, i, first + q, t, found, opacity)
@@ -261,7 +261,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                     i = start + g * 8
                     if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q)):
                         far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
-                        todo = may_meet(near)
+                        todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
                             t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
                             record(rays, i, first + q, t, found, opacity)
