@@ -3,8 +3,12 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import Blob, FieldError, Node, Scale, Scene
+from rtcore import Blob, FieldError, Matrix, Node, Scale, Scene, Shear
+from rtcore.flatten import flatten
+from rtcore.reports.condition import condition
 from rtcore.reports.oracle import TWINS, crossings, mp, nearest, vector
+from rtcore.trace import CLOSEST
+from rtcore.wave import DX, OX, SLOW, START, T, new_rays
 
 ONE = Blob([((0, 0, 0), 1, 1)], 0.6)
 TWO = Blob([((0.75, 0, 0), 1, 1), ((-0.75, 0, 0), 1, 1)], 0.3828125)
@@ -140,6 +144,67 @@ def test_far_negative_and_tiny_elements_do_no_harm():
     assert np.allclose(cast(more, [(-5, 0.1, 0)], (1, 0, 0)).t, plain, rtol=1e-15)
     pit = Blob([*ONE.elements, ((0, 0, 0), 1e40, -0.1)], 0.6)      # as if the threshold were 0.7
     assert np.allclose(cast(pit, [(-5, 0, 0)], (1, 0, 0)).t, cast(Blob(ONE.elements, 0.7), [(-5, 0, 0)], (1, 0, 0)).t, rtol=1e-15)
+
+
+EIGHT = random_blob(np.random.default_rng(9), 8)
+TINY = Blob([((0.3, -0.2, 0.1), 1e-3, 1), ((0.3, -0.2, 0.1015), 1e-3, 1), ((-0.5, 0, 0), 0.8, 0.9)], 0.4)
+TURN = Matrix([[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, -7], [0.48, 0.64, 0.6, 3], [0, 0, 0, 1]])
+PLACES = {"as it is": (), "scaled": (Scale((1e-3,) * 3),), "moved": (TURN,), "sheared": (Scale((1, 2, 0.1)), Shear(xy=3)),
+          "stretched": (Scale((1e-6, 1, 1e6)),)}
+
+
+def rays_at(rng, blob, n):
+    """Rays from near and far at points of the elements, from within, past a saddle, and by small fractions."""
+    centers = np.array([c for c, _, _ in blob.elements])
+    radii = np.array([r for _, r, _ in blob.elements])
+    k, way = rng.integers(len(radii), size=n), rng.normal(size=(n, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    aims = centers[k] + rng.uniform(-0.5, 0.5, (n, 3)) * radii[k, None]
+    for distance in (3, 1e4):
+        yield aims - distance * way, way * 10 ** rng.uniform(-2, 2, (n, 1))
+    yield aims, way
+    off = 10 ** rng.uniform(-20, -3, (n, 2)) * rng.choice([-1, 0, 1], (n, 2))
+    yield np.stack([off[:, 0], np.full(n, -5), off[:, 1]], 1), np.broadcast_to(np.array([0.0, 1, 0]), (n, 3))
+    whole = rng.integers(-2, 3, (n, 3)).astype(float)
+    yield rng.integers(-6, 7, (n, 3)) / 4.0, np.where(whole.any(1)[:, None], whole, 1.0)
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("blob", [ONE, TWO, FULL, EIGHT, TINY])
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_first_crossing(precision, blob, place):
+    """The oracle's hit or miss, and its t to 8 condition u."""
+    rng, dtype = np.random.default_rng(4), {"f64": np.float64, "f32": np.float32}[precision]
+    node = Node(shape=blob, transform=PLACES[place])
+    matrix, = (leaf.matrix for leaf in Scene(objects=[node]).leaves())
+    shape = blob if precision == "f64" else blob.rounded(np.float32)
+    for o, d in rays_at(rng, blob, 8):
+        o, d = (o @ matrix[:3, :3].T + matrix[:3, 3]).astype(dtype), (d @ matrix[:3, :3].T).astype(dtype)
+        hits = rtcore.intersect(Scene(objects=[node]), o, d, precision=precision)
+        for origin, direction, t in zip(o, d, hits.t):
+            true = next((x for x in rtcore.crossings(node, origin, direction, precision) if x > 0), np.inf)
+            if t != true:
+                assert np.isfinite(t) and np.isfinite(true), (origin, direction)
+                worst = 8 * condition(shape, matrix, origin, direction, mp.mpf(float(true))) * np.finfo(dtype).eps / 2
+                assert abs(t - true) <= max(worst * true, np.spacing(true)), (origin, direction)
+
+
+def test_beside_a_saddle():
+    """Across it the field falls by the square of the distance, too little for double-double."""
+    for off in (2.0 ** -45, 2.0 ** -52, 1e-17):
+        for o, hit in (((0, -5, 0), True), ((off, -5, 0), True), ((0, -5, off), False), ((off, -5, off * 4), False)):
+            assert np.isfinite(cast(TWO, [o], (0, 1, 0)).t[0]) == hit == bool(len(rtcore.crossings(TWO, o, (0, 1, 0))))
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_few_rays_are_slow(precision):
+    rng, dtype = np.random.default_rng(3), {"f64": np.float64, "f32": np.float32}[precision]
+    origins, directions = random_rays(rng, 40_000)
+    group, = flatten(Scene(objects=[EIGHT]), precision).groups
+    rays = new_rays(len(origins), dtype)
+    rays.ray[OX:OX + 3], rays.ray[DX:DX + 3], rays.ray[START], rays.ray[T], rays.prim[:] = origins.T, directions.T, 0, np.inf, -1
+    group.kind.intersect(rays, len(origins), group.tree, group.table, 0, CLOSEST)
+    assert (rays.prim >= 0).mean() > 0.2 and rays.tally[SLOW] <= 8
 
 
 @pytest.mark.parametrize("elements,threshold,message", [

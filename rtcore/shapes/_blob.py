@@ -22,7 +22,8 @@ SPLIT = 0.46875                 # where a piece is cut: not in the middle, in wh
 NOISE = 2.0 ** -51              # rounding of the summed field, as a share of threshold + sum of |strength| w (1 + 4 / radius)
 TINY = 2.0 ** -45               # pieces are not cut to less, in lengths of the blob
 X, Y, Z, RADIUS, STRENGTH, PARTS = 0, 1, 2, 3, 4, 5     # of an element; in a table, what float32 leaves of each part follows
-MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ = 0, 1, 2, 3, 4       # of a span; the last: by how much w is to be multiplied for NOISE
+ROUGH = 5                       # of an element in Scratch: |strength| (1 + 4 / radius), which makes w's rounding the field's
+MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ = 0, 1, 2, 3, 4       # of a span; FUZZ is its element's ROUGH
 #: Of a ray: closest approach to the middle, unit direction, speed, t of the closest approach and what that lacks; origin and direction
 #: as pairs, high parts first.
 POINT, ALONG, SPEED, SHIFT, MORE, FROM, WAY, LINE_ROWS = 0, 3, 6, 7, 8, 9, 15, 21
@@ -33,7 +34,7 @@ LO, HI, RISES = 5, 6, 7         # of a piece, after its five coefficients; RISES
 class Scratch(NamedTuple):
     """What the search along one ray works on; made once per kernel call."""
 
-    element: np.ndarray     # float64 (n, 5): the blob at hand
+    element: np.ndarray     # float64 (n, 6): the blob at hand
     span: np.ndarray        # float64 (n, 5): of the elements that the ray meets, see MIDDLE ..
     end: np.ndarray         # float64 (2 n): where spans begin and end, ascending
     whose: np.ndarray       # int64 (2 n): number k of the span that begins there, ~k of the one that ends
@@ -45,7 +46,7 @@ class Scratch(NamedTuple):
 
 @inline
 def new_scratch(rays):
-    return Scratch(np.empty((MOST_ELEMENTS, 5)), np.empty((MOST_ELEMENTS, 5)), np.empty(2 * MOST_ELEMENTS + 1),
+    return Scratch(np.empty((MOST_ELEMENTS, 6)), np.empty((MOST_ELEMENTS, 5)), np.empty(2 * MOST_ELEMENTS + 1),
                    np.empty(2 * MOST_ELEMENTS, np.int64), np.empty(MOST_ELEMENTS, np.int64), np.empty((DEEPEST + 4, 8)),
                    np.empty((1, 8), rays.ray.dtype), np.empty((LINE_ROWS, 8)))
 
@@ -64,7 +65,7 @@ def meet(scratch, count, nx, ny, nz, ex, ey, ez, low):
             h = np.sqrt(square)
             if h - b > low:
                 span[m, MIDDLE], span[m, HALF2], span[m, RADIUS2], span[m, WEIGHT] = -b, square, r * r, element[k, STRENGTH]
-                span[m, FUZZ] = abs(element[k, STRENGTH]) * (1 + 4 / r)
+                span[m, FUZZ] = element[k, ROUGH]
                 for side in range(2):
                     at = -b - h if side == 0 else -b + h
                     j = 2 * m + side
@@ -152,7 +153,7 @@ def begins_inside(scratch, count, threshold, lane, start):
         a, a1 = add(b, b1, -a, -a1)
         if a > 0:
             a, a1 = divide(a, a1, b, b1)
-            size += abs(element[k, STRENGTH]) * a * (1 + 4 / element[k, RADIUS])
+            size += element[k, ROUGH] * a
             a, a1 = scale(*square(a, a1), element[k, STRENGTH])
             total, total1 = add(total, total1, a, a1)
     return np.sign(total) if abs(total) > 2.0 ** -96 * size else 0.0
@@ -214,10 +215,6 @@ def search(scratch, count, m, threshold, low, shift, more, speed, start, far, si
             if rises == 0:
                 lowest = min(min(c0, c1), min(min(c2, c3), c4))
                 highest = max(max(c0, c1), max(max(c2, c3), c4))
-                d0, d1, d2, d3 = c1 - c0, c2 - c1, c3 - c2, c4 - c3
-                least, most = min(min(d0, d1), min(d2, d3)), max(max(d0, d1), max(d2, d3))
-                slope = 1.0 if least > 4 * noise else -1.0 if most < -4 * noise else 0.0
-                sharp = min(min(abs(c0), abs(c1)), min(min(abs(c2), abs(c3)), abs(c4))) > noise
                 after = c4 > 0
                 if lowest > noise or highest < -noise:
                     if after != inside:         # it has crossed where the sign was not certain
@@ -228,6 +225,10 @@ def search(scratch, count, m, threshold, low, shift, more, speed, start, far, si
                             return keep(found, lane, shift + (more + lo / speed), start)
                     edge = 0.0
                     continue
+                d0, d1, d2, d3 = c1 - c0, c2 - c1, c3 - c2, c4 - c3
+                least, most = min(min(d0, d1), min(d2, d3)), max(max(d0, d1), max(d2, d3))
+                slope = 1.0 if least > 4 * noise else -1.0 if most < -4 * noise else 0.0
+                sharp = min(min(abs(c0), abs(c1)), min(min(abs(c2), abs(c3)), abs(c4))) > noise
                 if slope != 0:
                     if edge * slope < 0 or edge == 0 and (c0 > 0) != inside:
                         return UNSURE

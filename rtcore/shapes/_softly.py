@@ -1,8 +1,8 @@
 """One ray against a blob in double-double: the certain way out of `_blob.py`.
 
 The ray is brought to the unit space in some hundred digits; about its closest approach to the middle each element's w is a quadratic in
-pairs, and each stretch between the ends of their spans has a quartic in a variable that runs from -1 to 1. A value of the field less than
-TOUCH of the size of its terms is a touch.
+pairs, and each stretch between the ends of their spans has a quartic in a variable that runs from -1 to 1. Where pairs can't tell the sign
+of the field at a turning point it is summed in some hundred digits; less than TOUCH of the size of its terms is a touch.
 """
 import math
 
@@ -11,12 +11,14 @@ import numpy as np
 from rtcore.expansions import LONG, expand, put_products
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.pairs import add, divide, multiply, scale, square, square_root, two_product, two_sum
+from rtcore.shapes._blob import RADIUS, ROUGH, STRENGTH
 from rtcore.shapes._separate import between, stationary_of, value_at
 from rtcore.shapes._unit import line_expanded
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import SLOW, START, record_one
 
-TOUCH = 2.0 ** -99
+TOUCH = 2.0 ** -128     # turning points of turning points are good to 2^-33, their values to the fourth power of that
+DIM = 2.0 ** -94        # more than a sum of pairs may be off, as a share of the size of its terms
 LOW, LOW1, HIGH, HIGH1 = 6, 7, 8, 9     # of a span, after three coefficients: where it begins and ends
 
 
@@ -56,7 +58,7 @@ def spans_of(n, v, element, count, span, weight):
         for j in range(3):
             g[j, 0], g[j, 1] = add(n[j, 0], n[j, 1], -element[k, j], 0.0)
         b, b1 = dot_pairs(g, v)
-        r, r1 = two_product(element[k, 3], element[k, 3])
+        r, r1 = two_product(element[k, RADIUS], element[k, RADIUS])
         c, c1 = dot_pairs(g, g)
         c, c1 = add(r, r1, -c, -c1)
         x, x1 = square(b, b1)
@@ -70,9 +72,45 @@ def spans_of(n, v, element, count, span, weight):
             span[m, 0], span[m, 1] = divide(c, c1, r, r1)
             span[m, 2], span[m, 3] = divide(-b, -b1, r, r1)
             span[m, 4], span[m, 5] = divide(-a, -a1, r, r1)
-            weight[m] = element[k, 4]
+            weight[m] = element[k, STRENGTH]
             m += 1
     return m
+
+
+@kernel
+def sign_at(f, v, s, s1, x, x1, element, count, threshold):
+    """The sign of the field minus threshold at f + (s + s1 + x + x1) v, f and v expansions; 0 for a touch."""
+    out_of_line()
+    terms, total = np.empty(3 * LONG * LONG * 4), np.zeros(LONG)
+    at, g, w, inverse, size = np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(LONG), threshold
+    total[0] = -threshold
+    for k in range(3):
+        terms[:LONG] = f[k]
+        expand(terms, put_products(terms, LONG, 1.0, v[k], (s, s1, x, x1)), at[k])
+    for i in range(count):
+        r, r1 = two_product(element[i, RADIUS], element[i, RADIUS])
+        terms[0], terms[1], n = r, r1, 2
+        for k in range(3):
+            more = terms[n:]
+            more[:LONG], more[LONG] = at[k], -element[i, k]
+            expand(more, LONG + 1, g[k])
+            n = put_products(terms, n, -1.0, g[k], g[k])
+        expand(terms, n, w)
+        if w[0] <= 0:
+            continue
+        # 1/r² by a Newton step from a pair: y + y (1 - r² y)
+        y, y1 = divide(1.0, 0.0, r, r1)
+        terms[0] = 1.0
+        expand(terms, put_products(terms, 1, -1.0, (r, r1), (y, y1)), inverse)
+        rest = inverse[0], inverse[1]
+        terms[0], terms[1] = y, y1
+        expand(terms, put_products(terms, 2, 1.0, (y, y1), rest), inverse)
+        expand(terms, put_products(terms, 0, 1.0, w, inverse), g[0])
+        expand(terms, put_products(terms, 0, 1.0, g[0], g[0]), g[1])
+        terms[:LONG] = total
+        expand(terms, put_products(terms, LONG, 1.0, g[1], (element[i, STRENGTH], 0.0)), total)
+        size += element[i, ROUGH] * g[0, 0]
+    return np.sign(total[0]) if abs(total[0]) > TOUCH * size else 0.0
 
 
 @inline
@@ -163,15 +201,15 @@ def settle(rays, i, p, exact, q, element, count, threshold, side, opacity):
         half, half1 = add(0.5 * hi, 0.5 * hi1, -0.5 * lo, -0.5 * lo1)
         if now == 0:
             y = value_at(form, 4, -1.0, 0.0)[0]
-            now = np.sign(y) if abs(y) > TOUCH * size else 0.0
+            now = np.sign(y) if abs(y) > DIM * size else sign_at(f, v, s, s1, lo, lo1, element, count, threshold)
         turns = stationary_of(form, -1.0, 1.0, poly, stop)
         stop[turns, 0], stop[turns, 1] = 1.0, 0.0
         at, at1 = -1.0, 0.0
         for j in range(turns + 1):
             y = value_at(form, 4, stop[j, 0], stop[j, 1])[0]
-            sign = np.sign(y) if abs(y) > TOUCH * size else 0.0
             x, x1 = multiply(stop[j, 0], stop[j, 1], half, half1)
             x, x1 = add(x, x1, middle, middle1)
+            sign = np.sign(y) if abs(y) > DIM * size else sign_at(f, v, s, s1, x, x1, element, count, threshold)
             if sign == 0:
                 if not touching and now != 0:
                     touching, touch, touch1 = True, x, x1

@@ -11,8 +11,8 @@ from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, greatest, load, root, size, store, vec3
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import advance, lowest
-from rtcore.shapes._blob import (ALONG, FROM, HIT, MISS, MORE, MOST_ELEMENTS, NOISE, PARTS, POINT, RADIUS, SHIFT, SPEED, STRENGTH, UNSURE,
-                                 WAY, X, Y, Z, meet, new_scratch, search)
+from rtcore.shapes._blob import (ALONG, FROM, HIT, MISS, MORE, MOST_ELEMENTS, NOISE, PARTS, POINT, RADIUS, ROUGH, SHIFT, SPEED, STRENGTH,
+                                 UNSURE, WAY, X, Y, Z, meet, new_scratch, search)
 from rtcore.shapes._softly import settle
 from rtcore.shapes._unit import line_in_pairs
 from rtcore.shapes.kind import OWN, REACH, Kind, Packed, around, forward, normalized, placed, put_placed, unit_hit
@@ -95,6 +95,7 @@ def take_elements(element, data, q, extra):
     for k in range(count):
         for j in range(PARTS):
             element[k, j] = np.float64(extra[first + k, j]) + np.float64(extra[first + k, PARTS + j])
+        element[k, ROUGH] = abs(element[k, STRENGTH]) * (1 + 4 / element[k, RADIUS])
     return count
 
 
@@ -196,7 +197,7 @@ def gradient(element, count, threshold, x, y, z):
 @kernel
 def surface(rays, n, out, table, first):
     last, taken, count, threshold = first + table.data.shape[0], -1, 0, 0.0
-    data, element = table.data, np.empty((MOST_ELEMENTS, 5))
+    data, element = table.data, np.empty((MOST_ELEMENTS, PARTS + 1))
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
@@ -218,10 +219,11 @@ def surface(rays, n, out, table, first):
             ux, uy, uz = normalized(x, y, z)
             u, v = around(out, uy, ux), np.arccos(min(max(-uz, -1.0), 1.0)) / np.pi if out.shape[0] > U else 0.0
             put_placed(out, i, data, q, x, y, z, nx, ny, nz, u, v)
-            # the rounding of the field moves a flat surface further than that of the point
-            size = max(abs(data[q, 12]) + abs(data[q, 13]) + abs(data[q, 14]), max(
+            # what is left of the field, by the slope; where that vanishes the surface is as far as a parabola takes to rise by it
+            width = max(abs(data[q, 12]) + abs(data[q, 13]) + abs(data[q, 14]), max(
                 abs(data[q, 15]) + abs(data[q, 16]) + abs(data[q, 17]), abs(data[q, 18]) + abs(data[q, 19]) + abs(data[q, 20])))
-            out[ERR, i] = max(out[ERR, i], size * min(noise / max(steep, noise), 1e-6))
+            left = abs(f) + noise
+            out[ERR, i] += 2 * width * left / max(steep, np.sqrt(left))
 
 
 def _bounds(data, extra):
