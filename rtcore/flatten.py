@@ -105,7 +105,8 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         extra = np.concatenate([p.extra if p.extra is not None else np.zeros((len(p.data), 9)) for _, p in packs])
     outline = np.repeat([index for index, _ in packs], [len(p.extra) for _, p in packs]) if kind.shared_extra else owner
     with np.errstate(over="ignore"):
-        wild = [of[~np.isfinite(a.astype(dtype)).all(axis=1)] for a, of in ((data, owner), (extra, outline), (exact, owner)) if len(a)]
+        wild = [of[~np.isfinite(a.astype(kept)).all(axis=1)]
+                for a, of, kept in ((data, owner, dtype), (extra, outline, dtype), (exact, owner, np.float64)) if len(a)]
     if any(map(len, wild)):
         leaf = leaves[np.concatenate(wild)[0]]
         raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))

@@ -1,26 +1,17 @@
-"""Plane: the ray's height above it over the speed at which it falls (the notes' first form).
-
-Both in plain float64 first, with a bound on their errors; then, for lanes that may hit, in double-double, with another; lanes for which
-that is not certain go one by one to sums in some hundred digits.
-"""
-from fractions import Fraction
+"""Plane: the ray's height above it over the speed at which it falls (the notes' first form); what makes it certain is in `_flat.py`."""
 from typing import Annotated
 
 import numpy as np
 
-from rtcore.exact import dot as product, inverse, moved, parts
-from rtcore.expansions import LONG, expand, put_products
+from rtcore.exact import moved
 from rtcore.fields import Vec, Vector
-from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3, wide
-from rtcore.pairs import add, divide, multiply, scale, two_sum
+from rtcore.jit import kernel
+from rtcore.lanes import any_lane, bits
 from rtcore.scene import Shape, invertible
-from rtcore.shapes._ball import U64, extent, lowest
-from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, put_flat
-from rtcore.wave import DX, OX, SLOW, START, T, record, record_one
-
-#: Columns of Table.exact: three parts each of the point and of the normal.
-POINT, NORMAL = 0, 9
+from rtcore.shapes._ball import lowest
+from rtcore.shapes._flat import NORMAL, approach, exact_plane, meet, settle
+from rtcore.shapes.kind import Kind, Packed, put_flat
+from rtcore.wave import record
 
 
 class Plane(Shape, frozen=True):
@@ -34,95 +25,16 @@ class Plane(Shape, frozen=True):
 
     def pack(self, matrix: np.ndarray) -> Packed:
         invertible(matrix)
-        columns = zip(*inverse(matrix))
-        normal = [product(column, map(Fraction, self.normal)) for column in columns]
-        normal = [x / max(map(abs, normal)) for x in normal]
-        flat = np.array(normal, float)
-        point = moved(matrix, self.point)
-        exact = [*parts(point, 3), *parts(normal, 3)]
-        return Packed(PLANE, np.array([[*parts(point, 1), *(flat / np.linalg.norm(flat))]]), exact=np.array([exact]))
-
-
-@inline
-def approach(ray, i, exact, q):
-    """Of eight rays and plane q, plainly: those that may reach it within their interval."""
-    down, d, normal = splat3(exact, q, POINT) - wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, NORMAL)
-    height, speed = dot(normal, down), dot(normal, d)
-    t = height / speed
-    # no number of the normal is above 1; the point is known to a rounding, also where it is far away
-    slack = 2.0 ** -20 * size(t) + 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT))) / size(speed)
-    start, end = wide(load(ray, START, i)), wide(load(ray, T, i))
-    return (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
-
-
-@inline
-def meet(ray, i, exact, q, todo, side):
-    """Where the lanes `todo` reach plane q: t in the rays' precision, the lanes that do, those for which this is not certain."""
-    o, d, start, end = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), load(ray, START, i), load(ray, T, i)
-    p, p1, n, n1 = splat3(exact, q, POINT), splat3(exact, q, POINT + 3), splat3(exact, q, NORMAL), splat3(exact, q, NORMAL + 3)
-    x, x1 = fall(o.x, p.x, p1.x, n.x, n1.x)
-    y, y1 = fall(o.y, p.y, p1.y, n.y, n1.y)
-    z, z1 = fall(o.z, p.z, p1.z, n.z, n1.z)
-    h, h1 = add(x, x1, y, y1)
-    h, h1 = add(h, h1, z, z1)
-    x, x1 = scale(n.x, n1.x, d.x)
-    y, y1 = scale(n.y, n1.y, d.y)
-    z, z1 = scale(n.z, n1.z, d.z)
-    v, v1 = add(x, x1, y, y1)
-    v, v1 = add(v, v1, z, z1)
-    t, _ = divide(h, h1, v, v1)
-    blur = 32 * U64 * U64
-    reach = blur * (extent(o) + extent(p))
-    turn = blur * extent(d)
-    falls = size(v) > turn
-    off = (reach + turn * size(t)) / (size(v) - turn)
-    first, last = wide(start), wide(end)
-    outside = (t + off < first) | (t - off > last)
-    sure = falls & ((off <= U64 * size(t)) | outside)
-    hit = todo & sure & ~outside
-    if side == FRONT:
-        hit = hit & (v < 0)
-    elif side == BACK:
-        hit = hit & (v > 0)
-    return rounded(t, end), hit, todo & ~sure
-
-
-@inline
-def fall(o, p, p1, n, n1):
-    """(n + n1)·((p + p1) - o) as a pair."""
-    s, e = two_sum(p, -o)
-    s, e = two_sum(s, e + p1)
-    return multiply(s, e, n, n1)
-
-
-@kernel
-def settle(rays, i, p, table, q, opacity):
-    """Ray i against plane q, the slow and certain way."""
-    out_of_line()
-    rays.tally[SLOW] += 1
-    exact, ray = table.exact, rays.ray
-    terms, down, height, speed = np.empty(18 * LONG + LONG), np.empty(LONG), np.empty(LONG), np.empty(LONG)
-    more = np.empty(18 + LONG)
-    n, m = 0, 0
-    for k in range(3):
-        normal = exact[q, NORMAL + k], exact[q, NORMAL + 3 + k], exact[q, NORMAL + 6 + k]
-        more[0], more[1], more[2], more[3] = exact[q, POINT + k], exact[q, POINT + 3 + k], exact[q, POINT + 6 + k], -ray[OX + k, i]
-        expand(more, 4, down)
-        n = put_products(terms, n, 1.0, normal, down)
-    expand(terms, n, height)
-    for k in range(3):
-        normal = exact[q, NORMAL + k], exact[q, NORMAL + 3 + k], exact[q, NORMAL + 6 + k]
-        m = put_products(more, m, 1.0, normal, (np.float64(ray[DX + k, i]),))
-    expand(more, m, speed)
-    if (speed[0] < 0 and table.side[q] != BACK) or (speed[0] > 0 and table.side[q] != FRONT):
-        record_one(rays, i, p, divide(height[0], height[1], speed[0], speed[1])[0], opacity)
+        exact = np.array(exact_plane(matrix, moved(matrix, self.point), self.normal))
+        normal = exact[NORMAL:NORMAL + 3]
+        return Packed(PLANE, np.array([[*exact[:3], *(normal / np.linalg.norm(normal))]]), exact=exact[None])
 
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
     for q in range(table.data.shape[0]):
         for i in range(0, n, 8):
-            todo = approach(rays.ray, i, table.exact, q)
+            _, todo = approach(rays.ray, i, table.exact, q)
             if any_lane(todo):
                 t, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
                 record(rays, i, first + q, t, hit, opacity)

@@ -1,17 +1,21 @@
 """Polygon: the plane's hit, then the crossing rule with half-open edges in the two axes that the normal points at least."""
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import moved, rationals
 from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, dot, load, load3, rounded, splat3, wide
-from rtcore.scene import Shape
-from rtcore.shapes.kind import BACK, FRONT, Kind, Packed, put_flat
-from rtcore.wave import DX, OX, START, T, record
+from rtcore.lanes import any_lane, bits, load, wide
+from rtcore.scene import Shape, invertible
+from rtcore.shapes._ball import lowest
+from rtcore.shapes._flat import NORMAL, approach, exact_plane, meet, settle
+from rtcore.shapes.kind import Kind, Packed, put_flat
+from rtcore.wave import DX, OX, record
 
-NORMAL, DROP, FIRST, COUNT = 3, 6, 7, 8     # columns after the first vertex
+FLAT, DROP, FIRST, COUNT = 3, 6, 7, 8       # columns after the middle: normal, axis to drop, where the outline begins, its length
 
 
 class Polygon(Shape, frozen=True):
@@ -38,13 +42,14 @@ class Polygon(Shape, frozen=True):
         return POLYGON
 
     def pack(self, matrix: np.ndarray) -> Packed:
+        invertible(matrix)
         points = np.array(self.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
-        normal = newell(points)
-        normal /= np.linalg.norm(normal)
-        mirrored = np.linalg.det(matrix[:3, :3]) < 0
-        drop = float(np.abs(normal).argmax())
-        flat = [*points.mean(0), *(-normal if mirrored else normal)]
-        return Packed(POLYGON, np.array([[*flat, drop, 0.0, len(points)]]), points, exact=np.array([flat]))
+        corners = [rationals(corner) for corner in self.vertices]
+        middle = moved(matrix, [sum(coordinates) / len(corners) for coordinates in zip(*corners)])
+        exact = np.array(exact_plane(matrix, middle, exact_newell(corners)))
+        normal = exact[NORMAL:NORMAL + 3] / np.linalg.norm(exact[NORMAL:NORMAL + 3])
+        row = [*exact[:3], *normal, float(np.abs(normal).argmax()), 0.0, len(points)]
+        return Packed(POLYGON, np.array([row]), points, exact=exact[None])
 
 
 def newell(points: np.ndarray) -> np.ndarray:
@@ -54,18 +59,10 @@ def newell(points: np.ndarray) -> np.ndarray:
     return np.cross(p, np.roll(p, -1, axis=0)).sum(0)
 
 
-@inline
-def on_plane(ray, i, exact, q, side):
-    """Where eight rays meet the plane of polygon q, in float64, and whether they do in their interval, seeing a visible side."""
-    normal, d = splat3(exact, q, NORMAL), wide(load3(ray, DX, i))
-    speed = dot(normal, d)
-    t = dot(normal, splat3(exact, q, 0) - wide(load3(ray, OX, i))) / speed
-    ok = (t > wide(load(ray, START, i))) & (t <= wide(load(ray, T, i)))
-    if side & FRONT:
-        ok = ok & (speed < 0)
-    elif side & BACK:
-        ok = ok & (speed > 0)
-    return t, ok
+def exact_newell(points) -> list[Fraction]:
+    """Newell's normal of a polygon of rationals, of any length."""
+    p = [[x - y for x, y in zip(point, points[0])] for point in points]
+    return [sum(a[j] * b[k] - a[k] * b[j] for a, b in zip(p, p[1:])) for j, k in ((1, 2), (2, 0), (0, 1))]
 
 
 @inline
@@ -99,10 +96,16 @@ def intersect(rays, n, tree, table, first, opacity):
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        t, ok = on_plane(rays.ray, i, table.exact, q, table.side[q])
-                        if any_lane(ok):
-                            ok = ok & in_outline(rays.ray, i, table.extra, begins, count, (drop + 1) % 3, (drop + 2) % 3, t)
-                            record(rays, i, first + q, rounded(t, load(rays.ray, T, i)), ok, opacity)
+                        t, todo = approach(rays.ray, i, table.exact, q)
+                        if any_lane(todo):
+                            todo = todo & in_outline(rays.ray, i, table.extra, begins, count, (drop + 1) % 3, (drop + 2) % 3, t)
+                        if any_lane(todo):
+                            s, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
+                            record(rays, i, first + q, s, hit, opacity)
+                            late = bits(unsure)
+                            while late:
+                                settle(rays, i + lowest(late), first + q, table, q, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -113,14 +116,14 @@ def surface(rays, n, out, table, first):
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
-            put_flat(rays, i, out, table.data, q, NORMAL)
+            put_flat(rays, i, out, table.data, q, FLAT)
 
 
 def _bounds(data, extra):
     spans = [extra[int(f):int(f) + int(c)] for f, c in data[:, FIRST:COUNT + 1]]
     low, high = np.array([s.min(0) for s in spans]), np.array([s.max(0) for s in spans])
     # the hit is on the plane, beside the outline by what that is not flat or was rounded: along the axis dropped, at most √3 times that
-    beside = [np.abs((s - row[:3]) @ row[NORMAL:NORMAL + 3]).max() for s, row in zip(spans, data)]
+    beside = [np.abs((s - row[:3]) @ row[FLAT:FLAT + 3]).max() for s, row in zip(spans, data)]
     pad = 1e-6 * (high - low).max(1, keepdims=True) + 2 * np.array(beside)[:, None]
     return low - pad, high + pad
 
