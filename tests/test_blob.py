@@ -8,7 +8,7 @@ from rtcore.flatten import flatten
 from rtcore.reports.condition import condition
 from rtcore.reports.oracle import TWINS, crossings, mp, nearest, vector
 from rtcore.trace import CLOSEST
-from rtcore.wave import DX, OX, SLOW, START, T, new_rays
+from rtcore.wave import DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
 
 ONE = Blob([((0, 0, 0), 1, 1)], 0.6)
 TWO = Blob([((0.75, 0, 0), 1, 1), ((-0.75, 0, 0), 1, 1)], 0.3828125)
@@ -48,7 +48,7 @@ def random_rays(rng, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 def field(blob: Blob, points: np.ndarray) -> np.ndarray:
     """Field minus threshold at points (..., 3)."""
-    total = np.full(points.shape[:-1], -blob.threshold)
+    total = np.full(points.shape[:-1], -blob.threshold, points.dtype)
     for center, radius, strength in blob.elements:
         total += strength * np.maximum(1 - ((points - center) ** 2).sum(-1) / radius ** 2, 0) ** 2
     return total
@@ -196,15 +196,37 @@ def test_beside_a_saddle():
             assert np.isfinite(cast(TWO, [o], (0, 1, 0)).t[0]) == hit == bool(len(rtcore.crossings(TWO, o, (0, 1, 0))))
 
 
-@pytest.mark.parametrize("precision", ["f64", "f32"])
-def test_few_rays_are_slow(precision):
-    rng, dtype = np.random.default_rng(3), {"f64": np.float64, "f32": np.float32}[precision]
-    origins, directions = random_rays(rng, 40_000)
-    group, = flatten(Scene(objects=[EIGHT]), precision).groups
-    rays = new_rays(len(origins), dtype)
+def kernels(blob, origins, directions, precision):
+    """Rays and surface rows straight from the kernels."""
+    group, = flatten(Scene(objects=[blob]), precision).groups
+    rays = new_rays(len(origins), {"f64": np.float64, "f32": np.float32}[precision])
     rays.ray[OX:OX + 3], rays.ray[DX:DX + 3], rays.ray[START], rays.ray[T], rays.prim[:] = origins.T, directions.T, 0, np.inf, -1
     group.kind.intersect(rays, len(origins), group.tree, group.table, 0, CLOSEST)
+    out = np.zeros((SURFACE_ROWS, len(origins)), rays.ray.dtype)
+    group.kind.surface(rays, len(origins), out, group.table, 0)
+    return rays, out[:, rays.prim >= 0]
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_few_rays_are_slow(precision):
+    rays, _ = kernels(EIGHT, *random_rays(np.random.default_rng(3), 40_000), precision)
     assert (rays.prim >= 0).mean() > 0.2 and rays.tally[SLOW] <= 8
+
+
+@pytest.mark.parametrize("blob", [ONE, TWO, EIGHT, TINY])
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_the_point_is_as_close_as_promised(precision, blob):
+    """Field by slope, or by a parabola's rise where the slope vanishes: the surface is within ERR of the point."""
+    for origins, directions in rays_at(np.random.default_rng(6), blob, 200):
+        _, out = kernels(blob, origins, directions, precision)
+        shape = blob if precision == "f64" else blob.rounded(np.float32)
+        p = out[:3].T.astype(np.longdouble)
+        steep = np.zeros_like(p)
+        for center, radius, strength in shape.elements:
+            u = p - center
+            steep += 4 * strength / radius ** 2 * np.maximum(1 - (u ** 2).sum(-1) / radius ** 2, 0)[:, None] * u
+        value, slope, error = np.abs(field(shape, p)), np.linalg.norm(steep.astype(float), axis=1), out[ERR]
+        assert (value <= 1.01 * error * slope + 8 * error.astype(float) ** 2 + 1e-17).all()
 
 
 @pytest.mark.parametrize("elements,threshold,message", [
