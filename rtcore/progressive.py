@@ -255,7 +255,7 @@ class Renderer:
         return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),
                 "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed},
-                "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified_hits": uncertified,
+                "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified": uncertified,
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
                 "error": {"rmse_estimate": films.rmse_estimate(render.film)}}

@@ -194,14 +194,15 @@ def enclose(search, k):
 
 @kernel
 def march(code, search, rays, n, side, single, found, doubt, roots):
-    """The first root of each of n local rays (RAY_ROWS, n or more) that counts, into found (n) as t (inf: none) and doubt (n) whether it
-    lacks a proof.
+    """The first root of each of n local rays (RAY_ROWS, n or more) that counts, into found (n) as t (inf: none) and doubt (n) whether it, or
+    that there is none, lacks a proof.
 
     side: as in Table.side. single: t will be rounded to float32. roots: (0, 2), or of one ray every root is written there, as t and how
     often, and nothing into found; returns how many.
     """
     state, at, point, whose = search.state, search.at, search.point, search.whose
     found[:n] = np.inf
+    doubt[:n] = 0
     waiting, live, count = 0, 0, 0
     for k in range(8):
         waiting = begin(search, rays, n, waiting, k)
@@ -218,7 +219,8 @@ def march(code, search, rays, n, side, single, found, doubt, roots):
             low, high, d, d1 = at[VALUE, k], at[VALUE + 1, k], at[SLOPE, k], at[SLOPE + 1, k]
             tries = state[TRIES, k] + 1
             state[TRIES, k] = tries
-            if tries > 8 * PATIENCE:        # it gives up
+            if tries > 8 * PATIENCE:        # it gives up, which is no proof that there is nothing
+                doubt[whose[k]] = 1
                 waiting = begin(search, rays, n, waiting, k)
                 live -= whose[k] < 0
                 continue

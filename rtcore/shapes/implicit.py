@@ -174,8 +174,10 @@ def intersect(rays, n, tree, table, first, opacity):
 def note_doubt(rays, i, p, found, doubt, m):
     """After `record` of primitive p: which of rays i .. i+7 have a hit on it without a proof."""
     for k in range(8):
-        if rays.prim[i + k] == p and found[0, m + k] < np.inf:
+        hit = rays.prim[i + k] == p and found[0, m + k] < np.inf
+        if hit:
             rays.doubt[i + k] = doubt[m + k]
+        if hit or found[0, m + k] == np.inf:        # one that was given up counts too
             rays.tally[UNCERTIFIED] += doubt[m + k]
 
 
