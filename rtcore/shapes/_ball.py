@@ -89,7 +89,7 @@ def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, si
     s = 0 * middle
     found = todo & ~todo
     if side & BACK == 0:
-        enter = select(middle > 0, inner, outer)
+        enter = select(outer > 0, inner, outer)      # outer, not middle: that may be 0 of either sign
         todo = todo & (enter - slack < end)
         want = todo & (enter + slack > start)
         if any_lane(want):
@@ -99,7 +99,7 @@ def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, si
             found = want & ok & (s > start)
             todo = todo & ~(want & ~ok) & ~found
     if side & FRONT == 0:
-        leave = select(middle > 0, outer, inner)
+        leave = select(outer > 0, outer, inner)
         want = todo & (leave + slack > start) & (leave - slack < end)
         if any_lane(want):
             r, slope, left = polish(f, f1, v, v1, leave, radius, radius1, far, speed)
@@ -126,8 +126,9 @@ def certain(t, slope, left, start, end):
 
 
 @kernel
-def settle_one(rays, i, p, f, d, radius, radius1, power, side, opacity):
-    """Record where ray i alone crosses the ball: f and d are expansions (3, LONG) in units of `power`."""
+def settle_one(rays, i, p, f, d, far, speed, radius, radius1, power, side, opacity):
+    """Record where ray i alone crosses the ball: f and d are expansions (3, LONG) in units of `power`, off by roundings of `far` and
+    `speed`; exact if those are 0. A tangent has no side."""
     out_of_line()
     rays.tally[SLOW] += 1
     terms = np.empty(6 * LONG * LONG + 8 + LONG)
@@ -145,7 +146,9 @@ def settle_one(rays, i, p, f, d, radius, radius1, power, side, opacity):
         n = put_products(terms, n, 1.0, f[k], f[k])
     n = put_products(terms, n, -1.0, (radius, radius1), (radius, radius1))
     expand(terms, n, form[2])
-    solve_quadratic(form[0], form[1], form[2], roots)
+    most = speed * speed, far * speed, far * (far + 1)
+    if solve_quadratic(form[0], form[1], form[2], most, roots) == 0 and side & (FRONT | BACK):
+        return
     enter, leave = min(roots[0, 0], roots[1, 0]) * power, max(roots[0, 0], roots[1, 0]) * power
     if side & BACK == 0 and enter > rays.ray[START, i]:
         record_one(rays, i, p, enter, opacity)

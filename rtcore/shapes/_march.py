@@ -194,8 +194,8 @@ def enclose(search, k):
 
 @kernel
 def march(code, search, rays, n, side, single, found, doubt, roots):
-    """The first root of each of n local rays (RAY_ROWS, n or more) that counts, into found (n) as t (inf: none) and doubt (n) whether it, or
-    that there is none, lacks a proof.
+    """The first root of each of n local rays (RAY_ROWS, n or more) that counts, into found (n) as t (inf: none) and doubt (n) whether it,
+    or that there is none, lacks a proof.
 
     side: as in Table.side. single: t will be rounded to float32. roots: (0, 2), or of one ray every root is written there, as t and how
     often, and nothing into found; returns how many.

@@ -4,8 +4,8 @@ The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers
 leads to; a box there, a slab, or the whole space says which of its points belong to the surface. Along a ray about its closest approach
 to the unit space's origin it is a s² + 2 b s + c.
 
-Columns of Table.exact: three parts each of the centre, of L by rows, of the ten numbers; then two parts of the box's corners, or of the
-slab's vector e: it is what has |e·p| <= 1/2.
+Columns of Table.exact: those of `_unit.py`; three parts each of the ten numbers; two parts of the box's corners, or of the slab's vector
+e: it is what has |e·p| <= 1/2.
 """
 from typing import NamedTuple
 
@@ -14,12 +14,13 @@ import numpy as np
 from rtcore.expansions import LONG, expand, put_products, solve_quadratic
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
-from rtcore.pairs import add, multiply, two_sum
+from rtcore.pairs import add, multiply
 from rtcore.shapes._ball import U64, advance, certain, extent
+from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import DX, OX, SLOW, START, T, record_one
 
-CENTER, INTO, FORM, BOX = 0, 9, 36, 66
+FORM, BOX = BEYOND, BEYOND + 30
 EVERYWHERE, IN_BOX, IN_SLAB = 0, 1, 2
 GONE = 2.0 ** 14    # how far a bound must be surpassed for plain arithmetic to be a good start
 
@@ -40,33 +41,6 @@ class Near(NamedTuple):
 
 
 @inline
-def times(exact, q, v):
-    """L v by the leading parts of L."""
-    a, b, c = splat3(exact, q, INTO), splat3(exact, q, INTO + 3), splat3(exact, q, INTO + 6)
-    return vec3(a.x * v.x + a.y * v.y + a.z * v.z, b.x * v.x + b.y * v.y + b.z * v.z, c.x * v.x + c.y * v.y + c.z * v.z)
-
-
-@inline
-def row(exact, q, k, v, v1):
-    """Row k of L times (v + v1), as a pair."""
-    a, b, zero = INTO + 3 * k, INTO + 9 + 3 * k, 0 * v.x
-    x, x1 = multiply(v.x, v1.x, exact[q, a] + zero, exact[q, b] + zero)
-    y, y1 = multiply(v.y, v1.y, exact[q, a + 1] + zero, exact[q, b + 1] + zero)
-    z, z1 = multiply(v.z, v1.z, exact[q, a + 2] + zero, exact[q, b + 2] + zero)
-    s, s1 = add(x, x1, y, y1)
-    return add(s, s1, z, z1)
-
-
-@inline
-def into_pairs(exact, q, v, v1):
-    """L (v + v1), as pairs."""
-    x, x1 = row(exact, q, 0, v, v1)
-    y, y1 = row(exact, q, 1, v, v1)
-    z, z1 = row(exact, q, 2, v, v1)
-    return vec3(x, y, z), vec3(x1, y1, z1)
-
-
-@inline
 def steepness(pull, mixed, v):
     """The gradient of the form's second-degree part at v."""
     return vec3(2 * pull.x * v.x + mixed.x * v.y + mixed.y * v.z, mixed.x * v.x + 2 * pull.y * v.y + mixed.z * v.z,
@@ -83,8 +57,8 @@ def difference(a, b, c, d):
 @inline
 def approach(ray, i, exact, q, most, curved):
     """Eight rays and surface q, plainly. most: the largest number of L; curved: that of the form's second-degree part."""
-    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, CENTER)) - splat3(exact, q, CENTER + 3), wide(load3(ray, DX, i))
-    f, d = times(exact, q, g), times(exact, q, v)
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
+    f, d = into_plain(exact, q, g), into_plain(exact, q, v)
     shift = -dot(f, d) / dot(d, d)
     n = along(f, shift, d)
     pull, mixed, slope = splat3(exact, q, FORM), splat3(exact, q, FORM + 3), splat3(exact, q, FORM + 6)
@@ -227,39 +201,14 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end,
 @inline
 def meet(ray, i, exact, q, most, part, limit, todo, near, side):
     """`choose` for surface q; t in the rays' precision."""
-    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, CENTER)
-    x, x1 = two_sum(o.x, -c.x)
-    y, y1 = two_sum(o.y, -c.y)
-    z, z1 = two_sum(o.z, -c.z)
-    zero = 0 * x
-    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, CENTER + 3))
-    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
-    end = load(ray, T, i)
-    t, found, unsure = choose(todo, near, form_of(exact, q, zero), f, f1, v, v1, near.far + most * extent(c), splat3(exact, q, BOX),
-                              splat3(exact, q, BOX + 3), part, limit, wide(load(ray, START, i)), wide(end), side)
+    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+    end, far = load(ray, T, i), near.far + most * extent(splat3(exact, q, PLACE))
+    t, found, unsure = choose(todo, near, form_of(exact, q, 0 * f.x), f, f1, v, v1, far, splat3(exact, q, BOX), splat3(exact, q, BOX + 3),
+                              part, limit, wide(load(ray, START, i)), wide(end), side)
     return rounded(t, end), found, unsure
 
 
 # --- the slow way ---
-
-@kernel
-def ray_parts(ray, i, exact, q, f, d):
-    """Ray i in the unit space of surface q, as expansions (3, LONG)."""
-    out_of_line()
-    g, terms, more = np.empty((3, LONG)), np.empty(36 * LONG + LONG), np.empty(18 + LONG)
-    for k in range(3):
-        terms[0], terms[1], terms[2], terms[3] = ray[OX + k, i], -exact[q, k], -exact[q, 3 + k], -exact[q, 6 + k]
-        expand(terms, 4, g[k])
-    for k in range(3):
-        n, m = 0, 0
-        for j in range(3):
-            a = INTO + 3 * k + j
-            factor = exact[q, a], exact[q, a + 9], exact[q, a + 18]
-            n = put_products(terms, n, 1.0, factor, g[j])
-            m = put_products(more, m, 1.0, factor, (np.float64(ray[DX + j, i]),))
-        expand(terms, n, f[k])
-        expand(more, m, d[k])
-
 
 @kernel
 def second_parts(exact, q, v, out):
@@ -310,7 +259,7 @@ def settle(rays, i, p, table, q, part, opacity):
     rays.tally[SLOW] += 1
     exact, ray, side = table.exact, rays.ray, table.side[q]
     f, d, form, roots = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((2, 2))
-    ray_parts(ray, i, exact, q, f, d)
+    line_expanded(ray, i, exact, q, f, d)
     line_form(exact, q, f, d, form)
     slope = solve_quadratic(form[0], form[1], form[2], roots)
     first = 0 if roots[0, 0] <= roots[1, 0] else 1

@@ -18,7 +18,8 @@ from rtcore.pairs import add, divide, multiply, square, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
-from rtcore.shapes._second import BOX, CENTER, FORM, IN_SLAB, INTO, approach, form_of, heights, into_pairs, line_form, may_meet, ray_parts
+from rtcore.shapes._second import BOX, FORM, IN_SLAB, approach, form_of, heights, line_form, may_meet
+from rtcore.shapes._unit import BEYOND, INTO, PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, around, forward, placed, put_placed, unit_hit
 from rtcore.wave import DX, OX, SLOW, START, T, alive, record, record_one
 
@@ -89,8 +90,8 @@ def frustum(base, base_radius, apex, apex_radius, capped, matrix) -> Packed:
         exact[INTO:INTO + 9] = np.eye(3).ravel() / power
     else:
         middle = [(p + q) / 2 for p, q in zip(rationals(base), rationals(apex))]
-        exact[CENTER:INTO] = parts(moved(matrix, middle), 3)
-        exact[INTO:FORM] = inverse_parts(matrix) / power
+        exact[PLACE:INTO] = parts(moved(matrix, middle), 3)
+        exact[INTO:BEYOND] = inverse_parts(matrix) / power
     numbers = (base_radius / most, (apex_radius - base_radius) / most, float(capped and base_radius > 0), float(capped and apex_radius > 0),
                np.abs(exact[INTO:INTO + 9]).max(), np.abs(exact[FORM:FORM + 6]).max(), np.linalg.norm(axis / power) / 2 + 2)
     return Packed(CONE, placed(local, back, *numbers)[None], exact=exact[None])
@@ -102,7 +103,7 @@ def exact_frustum(base, apex, base_radius, apex_radius, power, out):
     e·p is -1/2 .. 1/2 between the ends, r the radius in the middle, g what it grows by, K = A·A + g²; the slab's vector e = A / A·A."""
     axis, e, whole, whole1 = np.empty((3, 2)), np.empty((3, 2)), 0.0, 0.0
     for k in range(3):
-        out[CENTER + k], out[CENTER + 3 + k] = two_sum(0.5 * base[k], 0.5 * apex[k])
+        out[PLACE + k], out[PLACE + 3 + k] = two_sum(0.5 * base[k], 0.5 * apex[k])
         axis[k, 0], axis[k, 1] = two_sum(apex[k] / power, -base[k] / power)
         part, part1 = square(axis[k, 0], axis[k, 1])
         whole, whole1 = add(whole, whole1, part, part1)
@@ -130,8 +131,8 @@ def exact_frustum(base, apex, base_radius, apex_radius, power, out):
 @inline
 def near_cap(ray, i, exact, q, near, end):
     """Of eight rays, plainly: those that may cross the plane of the cap at e·p = end, a number, where the frustum is."""
-    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, CENTER)) - splat3(exact, q, CENTER + 3), wide(load3(ray, DX, i))
-    f, d, e = _second.times(exact, q, g), _second.times(exact, q, v), splat3(exact, q, BOX)
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
+    f, d, e = into_plain(exact, q, g), into_plain(exact, q, v), splat3(exact, q, BOX)
     rise = dot(e, d)
     t = (end - dot(e, f)) / rise
     p = along(f, t, d)
@@ -146,13 +147,8 @@ def near_cap(ray, i, exact, q, near, end):
 @inline
 def meet_cap(ray, i, exact, q, most, end, todo, near, side):
     """Where the lanes `todo` cross the cap at e·p = end: t in the rays' precision, the lanes that do, the uncertain ones."""
-    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, CENTER)
-    x, x1 = two_sum(o.x, -c.x)
-    y, y1 = two_sum(o.y, -c.y)
-    z, z1 = two_sum(o.z, -c.z)
-    zero = 0 * x
-    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, CENTER + 3))
-    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
+    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+    zero = 0 * f.x
     e, e1 = splat3(exact, q, BOX), splat3(exact, q, BOX + 6)
     h, h1 = height(e, e1, f, f1)
     w, w1 = height(e, e1, v, v1)
@@ -165,7 +161,7 @@ def meet_cap(ray, i, exact, q, most, end, todo, near, side):
     form = _second.value(m, x, x1, y, y1, z, z1)
     grow = 1 + extent(vec3(x, y, z))
     blur = 64 * U64 * U64 * extent(e)
-    far = near.far + most * extent(c) + 1
+    far = near.far + most * extent(splat3(exact, q, PLACE)) + 1
     left = blur * (far + near.speed * size(t)) / size(w)
     first, last = wide(load(ray, START, i)), wide(load(ray, T, i))
     outside = (t + left < first) | (t - left > last)
@@ -198,7 +194,7 @@ def settle_cap(rays, i, p, table, q, end, opacity):
     exact, side = table.exact, table.side[q]
     f, d, form, low, rise = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(LONG)
     terms, square_t = np.empty(2 * LONG * LONG + 5 * LONG + LONG), np.empty(LONG)
-    ray_parts(rays.ray, i, exact, q, f, d)
+    line_expanded(rays.ray, i, exact, q, f, d)
     heights(exact, q, f, low)
     heights(exact, q, d, rise)
     if rise[0] == 0 or (side & FRONT and rise[0] * end > 0) or (side & BACK and rise[0] * end < 0):

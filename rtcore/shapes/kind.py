@@ -1,14 +1,13 @@
 """What the flattener and the kernels share of every shape: primitive kinds, their tables, and the placing of a unit shape.
 
-A *shape* is what a person writes; a *kind* is what a kernel traces. Most shapes are of one kind; a sphere under a similarity stays a
-sphere, under any other transform it becomes an ellipsoid; a mesh is many triangles.
+A *shape* is what a person writes; a *kind* is what a kernel traces. Most shapes are of one kind; a sphere that a transform keeps round
+stays a sphere, under any other it becomes an ellipsoid; a mesh is many triangles.
 
 Every kind's module has two kernels with these signatures:
 
     intersect(rays, n, tree, table, first, opacity)     rays 0 .. n-1 against all primitives; reports through wave.record
     surface(rays, n, out, table, first)                 wave.Surface rows of the rays that hit primitive first .. first + len(table) - 1
 """
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -57,25 +56,7 @@ class Kind:
     shared_extra: bool = False          # extra is no row per primitive: data's last two columns are its first row and its length
 
 
-# --- similarities, and unit shapes placed by a matrix ---
-
-def similarity(matrix: np.ndarray) -> float | None:
-    """The scale of a 4 x 4 matrix that only moves, turns, mirrors and scales evenly, else None."""
-    return _similarity(matrix[:3, :3].tobytes())
-
-
-@functools.lru_cache(maxsize=4096)      # thousands of leaves share a few matrices, and are asked twice
-def _similarity(linear: bytes) -> float | None:
-    m = np.frombuffer(linear).reshape(3, 3)
-    most = np.abs(m).max()
-    if not 0 < most < np.inf:
-        return None
-    m = m / most        # so that no square overflows or underflows
-    square = m.T @ m
-    if np.abs(square - square[0, 0] * np.eye(3)).max() > 4 * np.finfo(float).eps * square[0, 0]:
-        return None
-    return float(most * np.sqrt(square[0, 0]))
-
+# --- unit shapes placed by a matrix ---
 
 def power_near(size):
     """A power of two that brings numbers of this size near 1, where their squares neither overflow nor vanish; 1 for ordinary sizes.

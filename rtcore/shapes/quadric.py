@@ -17,7 +17,8 @@ from rtcore.jit import kernel
 from rtcore.lanes import any_lane, bits
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
-from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, INTO, approach, may_meet, meet, settle
+from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, approach, may_meet, meet, settle
+from rtcore.shapes._unit import INTO
 from rtcore.shapes.kind import OWN, Kind, Packed, around, forward, normalized, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import alive, record
 

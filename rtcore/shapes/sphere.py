@@ -12,20 +12,20 @@ import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
-from rtcore.expansions import LONG, expand, put_products
+from rtcore.expansions import LONG, expand
 from rtcore.fields import Number, Vec, Vector
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
-from rtcore.pairs import add, multiply, two_sum
+from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
+from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, unit_hit)
 from rtcore.wave import DX, OX, START, T, U, alive, record
 
 
-#: Ellipsoids: column of the largest number of the matrix L into unit space; where L's parts begin in Table.exact, after the centre's.
-MOST, BACK_ROWS = OWN, 9
+MOST = OWN      # ellipsoids: column of the largest number of the matrix L into unit space
 
 
 class Sphere(Shape, frozen=True):
@@ -74,8 +74,9 @@ def _round_scale(linear: bytes) -> float | None:
 def quick_sphere(rays, i, data, q):
     """Whether any of eight rays may meet sphere q, by float32 arithmetic alone."""
     d = load3(rays.ray, DX, i)
-    f = (load3(rays.ray, OX, i) - splat3(data, q, 0)) * data[q, 5]
-    return any_lane(may_meet(closest(f, d, data[q, 3], extent(f), U32)))
+    c, unpower = splat3(data, q, 0), data[q, 5]
+    f = (load3(rays.ray, OX, i) - c) * unpower
+    return any_lane(may_meet(closest(f, d, data[q, 3], extent(f) + extent(c) * unpower, U32)))
 
 
 @inline
@@ -87,13 +88,21 @@ def approach(ray, i, data, exact, q):
 
 
 @inline
+def apart(o, c, c1):
+    """o - (c + c1) as a pair whose first number is the nearest, also where o is so near to c that c1 counts."""
+    f, f1 = two_sum(o, -c)
+    return two_sum(f, f1 - c1)
+
+
+@inline
 def meet(ray, i, data, exact, q, todo, far, near, side):
     """Where the lanes `todo` first meet sphere q: as `choose`, t in the rays' precision."""
     o, d, c, unpower = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0), np.float64(data[q, 5])
-    x, x1 = two_sum(o.x, -c.x)
-    y, y1 = two_sum(o.y, -c.y)
-    z, z1 = two_sum(o.z, -c.z)
-    f, f1 = vec3(x, y, z) * unpower, (vec3(x1, y1, z1) - splat3(exact, q, 3)) * unpower
+    c1 = splat3(exact, q, 3)
+    x, x1 = apart(o.x, c.x, c1.x)
+    y, y1 = apart(o.y, c.y, c1.y)
+    z, z1 = apart(o.z, c.z, c1.z)
+    f, f1 = vec3(x, y, z) * unpower, vec3(x1, y1, z1) * unpower
     end, zero = load(ray, T, i), 0 * x
     s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero,
                               far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, wide(end) * unpower, side)
@@ -164,15 +173,16 @@ def globe(out, x, y, z):
 @inline
 def quick_ellipsoid(rays, i, data, q):
     """Whether any of eight rays may meet ellipsoid q, by float32 arithmetic alone."""
-    g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
+    c = splat3(data, q, CENTER)
+    g, v = load3(rays.ray, OX, i) - c, load3(rays.ray, DX, i)
     f, d = into(data, q, g), into(data, q, v)
-    return any_lane(may_meet(closest(f, d, 1, reach(data[q, MOST], g, v, f, d), U32)))
+    return any_lane(may_meet(closest(f, d, 1, reach(data[q, MOST], g, v, f, d) + data[q, MOST] * extent(c), U32)))
 
 
 @inline
 def approach_ellipsoid(ray, i, data, exact, q):
     """As `approach`, in the unit space of ellipsoid q."""
-    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, 0)) - splat3(exact, q, 3), wide(load3(ray, DX, i))
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
     f, d = into_plain(exact, q, g), into_plain(exact, q, v)
     far = reach(np.float64(data[q, MOST]), g, v, f, d)
     return far, closest(f, d, 1, far, U64)
@@ -181,44 +191,11 @@ def approach_ellipsoid(ray, i, data, exact, q):
 @inline
 def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
     """As `meet`."""
-    o, d, c = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0)
-    x, x1 = two_sum(o.x, -c.x)
-    y, y1 = two_sum(o.y, -c.y)
-    z, z1 = two_sum(o.z, -c.z)
-    f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, 3))
-    end, zero = load(ray, T, i), 0 * x
-    v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
-    most = np.float64(data[q, MOST])
-    s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(c), most * extent(d),
-                              wide(load(ray, START, i)), wide(end), side)
+    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+    most, end, zero = np.float64(data[q, MOST]), load(ray, T, i), 0 * f.x
+    s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(splat3(exact, q, PLACE)),
+                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), wide(end), side)
     return rounded(s, end), found, unsure
-
-
-@inline
-def into_pairs(exact, q, v, v1):
-    """L (v + v1), as pairs."""
-    x, x1 = row(exact, q, 0, v, v1)
-    y, y1 = row(exact, q, 1, v, v1)
-    z, z1 = row(exact, q, 2, v, v1)
-    return vec3(x, y, z), vec3(x1, y1, z1)
-
-
-@inline
-def into_plain(exact, q, v):
-    """L v by the high parts of L."""
-    a, b, c = splat3(exact, q, BACK_ROWS), splat3(exact, q, BACK_ROWS + 3), splat3(exact, q, BACK_ROWS + 6)
-    return vec3(a.x * v.x + a.y * v.y + a.z * v.z, b.x * v.x + b.y * v.y + b.z * v.z, c.x * v.x + c.y * v.y + c.z * v.z)
-
-
-@inline
-def row(exact, q, k, v, v1):
-    """Row k of L times (v + v1), as a pair."""
-    a, b = BACK_ROWS + 3 * k, BACK_ROWS + 9 + 3 * k
-    x, x1 = multiply(v.x, v1.x, exact[q, a] + 0 * v.x, exact[q, b] + 0 * v.x)
-    y, y1 = multiply(v.y, v1.y, exact[q, a + 1] + 0 * v.x, exact[q, b + 1] + 0 * v.x)
-    z, z1 = multiply(v.z, v1.z, exact[q, a + 2] + 0 * v.x, exact[q, b + 2] + 0 * v.x)
-    s, s1 = add(x, x1, y, y1)
-    return add(s, s1, z, z1)
 
 
 @inline
@@ -232,20 +209,8 @@ def reach(most, g, v, f, d):
 def settle_ellipsoid(rays, i, p, table, q, opacity):
     """Ray i against ellipsoid q, the slow and certain way."""
     out_of_line()
-    exact, terms = table.exact, np.empty(36 + LONG)
-    g, f, d = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG))
-    for k in range(3):
-        terms[0], terms[1], terms[2], terms[3] = rays.ray[OX + k, i], -exact[q, k], -exact[q, 3 + k], -exact[q, 6 + k]
-        expand(terms, 4, g[k])
-    for k in range(3):
-        n, m, more = 0, 0, np.empty(7 * LONG * LONG)
-        for j in range(3):
-            a = BACK_ROWS + 3 * k + j
-            factor = exact[q, a], exact[q, a + 9], exact[q, a + 18]
-            m = put_products(more, m, 1.0, factor, g[j])
-            n = put_products(terms, n, 1.0, factor, (np.float64(rays.ray[DX + j, i]), 0.0))
-        expand(more, m, f[k])
-        expand(terms, n, d[k])
+    f, d = np.empty((3, LONG)), np.empty((3, LONG))
+    line_expanded(rays.ray, i, table.exact, q, f, d)
     settle_one(rays, i, p, f, d, 1.0, 0.0, 1.0, table.side[q], opacity)
 
 
