@@ -126,9 +126,9 @@ def certain(t, slope, left, start, end):
 
 
 @kernel
-def settle_one(rays, i, p, f, d, far, speed, radius, radius1, power, side, opacity):
-    """Record where ray i alone crosses the ball: f and d are expansions (3, LONG) in units of `power`, off by roundings of `far` and
-    `speed`; exact if those are 0. A tangent has no side."""
+def settle_one(rays, i, p, f, d, noise, radius, radius1, power, side, opacity):
+    """Record where ray i alone crosses the ball: f and d are expansions (3, LONG) in units of `power`, `noise` is what `solve_quadratic`
+    wants. A tangent has no side."""
     out_of_line()
     rays.tally[SLOW] += 1
     terms = np.empty(6 * LONG * LONG + 8 + LONG)
@@ -146,8 +146,7 @@ def settle_one(rays, i, p, f, d, far, speed, radius, radius1, power, side, opaci
         n = put_products(terms, n, 1.0, f[k], f[k])
     n = put_products(terms, n, -1.0, (radius, radius1), (radius, radius1))
     expand(terms, n, form[2])
-    most = speed * speed, far * speed, far * (far + 1)
-    if solve_quadratic(form[0], form[1], form[2], most, roots) == 0 and side & (FRONT | BACK):
+    if solve_quadratic(form[0], form[1], form[2], noise, roots) == 0 and side & (FRONT | BACK):
         return
     enter, leave = min(roots[0, 0], roots[1, 0]) * power, max(roots[0, 0], roots[1, 0]) * power
     if side & BACK == 0 and enter > rays.ray[START, i]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.expansions import LONG, expand, put_products, solve_quadratic
+from rtcore.expansions import LONG, expand, noise_of, put_products, solve_quadratic
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
 from rtcore.pairs import add, multiply
@@ -259,9 +259,15 @@ def settle(rays, i, p, table, q, part, opacity):
     rays.tally[SLOW] += 1
     exact, ray, side = table.exact, rays.ray, table.side[q]
     f, d, form, roots = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((2, 2))
-    line_expanded(ray, i, exact, q, f, d)
+    far, speed = line_expanded(ray, i, exact, q, f, d)
     line_form(exact, q, f, d, form)
-    slope = solve_quadratic(form[0], form[1], form[2], roots)
+    curved, steep = 0.0, 0.0
+    for k in range(6):
+        curved = max(curved, abs(exact[q, FORM + k]))
+    for k in range(6, 9):
+        steep = max(steep, abs(exact[q, FORM + k]))
+    noise = noise_of(f, d, far, speed, curved, steep, abs(exact[q, FORM + 9]))
+    slope = solve_quadratic(form[0], form[1], form[2], noise, roots)
     first = 0 if roots[0, 0] <= roots[1, 0] else 1
     for k in range(2):
         j = first if k == 0 else 1 - first
@@ -302,9 +308,9 @@ def in_box(exact, q, f, d, t):
 def heights(exact, q, v, out):
     """e·v as an expansion, e being the slab's vector, v expansions (3, LONG)."""
     out_of_line()
-    terms, n = np.empty(12 * LONG + LONG), 0
+    terms, n = np.empty(18 * LONG + LONG), 0
     for k in range(3):
-        n = put_products(terms, n, 1.0, (exact[q, BOX + k], exact[q, BOX + 6 + k]), v[k])
+        n = put_products(terms, n, 1.0, (exact[q, BOX + k], exact[q, BOX + 6 + k], exact[q, BOX + 9 + k]), v[k])
     expand(terms, n, out)
 
 

@@ -56,8 +56,10 @@ def line_in_pairs(ray, i, exact, q):
 
 @kernel
 def line_expanded(ray, i, exact, q, f, v):
-    """Origin and direction of ray i in the unit space of primitive q as expansions, into f and v (3, LONG) each."""
+    """Origin and direction of ray i in the unit space of primitive q as expansions, into f and v (3, LONG) each. Returns their largest
+    terms: what their errors are roundings of."""
     out_of_line()
+    far, speed = 0.0, 0.0
     terms, g = np.empty(7 * LONG * LONG), np.empty((3, LONG))
     for k in range(3):
         terms[0] = ray[OX + k, i]
@@ -69,9 +71,11 @@ def line_expanded(ray, i, exact, q, f, v):
         for j in range(3):
             a = INTO + 3 * k + j
             n = put_products(terms, n, 1.0, (exact[q, a], exact[q, a + 9], exact[q, a + 18]), g[j])
+            far, speed = max(far, abs(exact[q, a] * g[j, 0])), max(speed, abs(exact[q, a] * ray[DX + j, i]))
         expand(terms, n, f[k])
         n = 0
         for j in range(3):
             a = INTO + 3 * k + j
             n = put_products(terms, n, 1.0, (exact[q, a], exact[q, a + 9], exact[q, a + 18]), (np.float64(ray[DX + j, i]), 0.0))
         expand(terms, n, v[k])
+    return far, speed

@@ -4,17 +4,18 @@ What the rays meet is the exact form of second degree that the author's numbers 
 the axis A, in the author's own space, by `_second.py`; the caps are planes on which the form is at most 0. A ray along a generator or
 through the apex has A = 0: then one root is infinite and drops out.
 """
+import math
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
-from rtcore.expansions import LONG, expand, put_products
+from rtcore.expansions import LONG, NOISE, clear, expand, put_products
 from rtcore.fields import FieldError, Flag, Number, Vec, Vector
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
-from rtcore.pairs import add, divide, multiply, square, two_sum
+from rtcore.pairs import add, divide, multiply, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
@@ -99,33 +100,39 @@ def frustum(base, base_radius, apex, apex_radius, capped, matrix) -> Packed:
 
 @kernel
 def exact_frustum(base, apex, base_radius, apex_radius, power, out):
-    """Into a row of Table.exact: the middle as pairs; the form |p|² - K (e·p)² - 2 r g e·p - r², lengths over `power`, in pairs, where
-    e·p is -1/2 .. 1/2 between the ends, r the radius in the middle, g what it grows by, K = A·A + g²; the slab's vector e = A / A·A."""
-    axis, e, whole, whole1 = np.empty((3, 2)), np.empty((3, 2)), 0.0, 0.0
+    """Into a row of Table.exact: the middle as pairs; the form |p|² - K (e·p)² - 2 r g e·p - r², lengths over `power`, in three parts,
+    where e·p is -1/2 .. 1/2 between the ends, r the radius in the middle, g what it grows by, K = A·A + g²; the slab's vector
+    e = A / A·A. The form is scaled by a power of two to numbers of at most about 1."""
+    terms, axis, e = np.empty(2 * LONG * LONG + 2 * LONG), np.zeros((3, LONG)), np.zeros((3, LONG))
+    whole, curl, p, form = np.empty(LONG), np.empty(LONG), np.empty(LONG), np.empty((10, LONG))
+    radius, grown = two_sum(0.5 * base_radius / power, 0.5 * apex_radius / power), two_sum(apex_radius / power, -base_radius / power)
+    n = 0
     for k in range(3):
         out[PLACE + k], out[PLACE + 3 + k] = two_sum(0.5 * base[k], 0.5 * apex[k])
         axis[k, 0], axis[k, 1] = two_sum(apex[k] / power, -base[k] / power)
-        part, part1 = square(axis[k, 0], axis[k, 1])
-        whole, whole1 = add(whole, whole1, part, part1)
+        n = put_products(terms, n, 1.0, axis[k, :2], axis[k, :2])
+    expand(terms, n, whole)
+    terms[:LONG] = whole
+    expand(terms, put_products(terms, LONG, 1.0, grown, grown), curl)
     for k in range(3):
-        e[k, 0], e[k, 1] = divide(axis[k, 0], axis[k, 1], whole, whole1)
-        out[BOX + k], out[BOX + 6 + k] = e[k, 0], e[k, 1]
-    r, r1 = two_sum(0.5 * base_radius / power, 0.5 * apex_radius / power)
-    g, g1 = two_sum(apex_radius / power, -base_radius / power)
-    gg, gg1 = square(g, g1)
-    curl, curl1 = add(whole, whole1, gg, gg1)
+        rest = axis[k].copy()
+        for part in range(3):
+            e[k, part] = out[BOX + (0, 6, 9)[part] + k] = rest[0] / whole[0]
+            terms[:LONG] = rest
+            expand(terms, put_products(terms, LONG, -1.0, e[k, part:part + 1], whole), rest)
     for k in range(3):
-        p, p1 = multiply(curl, curl1, e[k, 0], e[k, 1])
-        s, s1 = multiply(p, p1, e[k, 0], e[k, 1])
-        out[FORM + k], out[FORM + 10 + k] = add(1.0, 0.0, -s, -s1)
+        expand(terms, put_products(terms, 0, 1.0, curl, e[k]), p)
+        terms[0] = 1.0
+        expand(terms, put_products(terms, 1, -1.0, p, e[k]), form[k])
         for j in range(k + 1, 3):
-            s, s1 = multiply(p, p1, -2 * e[j, 0], -2 * e[j, 1])
-            out[FORM + 2 + k + j], out[FORM + 12 + k + j] = s, s1
-        s, s1 = multiply(r, r1, g, g1)
-        s, s1 = multiply(-2 * s, -2 * s1, e[k, 0], e[k, 1])
-        out[FORM + 6 + k], out[FORM + 16 + k] = s, s1
-    s, s1 = square(r, r1)
-    out[FORM + 9], out[FORM + 19] = -s, -s1
+            expand(terms, put_products(terms, 0, -2.0, p, e[j]), form[2 + k + j])
+        expand(terms, put_products(terms, 0, -2.0, radius, grown), p)
+        expand(terms, put_products(terms, 0, 1.0, p, e[k]), form[6 + k])
+    expand(terms, put_products(terms, 0, -1.0, radius, radius), form[9])
+    scale = math.ldexp(1.0, -math.frexp(np.abs(form[:, 0]).max())[1])
+    for k in range(10):
+        for part in range(3):
+            out[FORM + 10 * part + k] = form[k, part] * scale
 
 
 @inline
@@ -194,15 +201,18 @@ def settle_cap(rays, i, p, table, q, end, opacity):
     exact, side = table.exact, table.side[q]
     f, d, form, low, rise = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(LONG)
     terms, square_t = np.empty(2 * LONG * LONG + 5 * LONG + LONG), np.empty(LONG)
-    line_expanded(rays.ray, i, exact, q, f, d)
+    far, speed = line_expanded(rays.ray, i, exact, q, f, d)
     heights(exact, q, f, low)
     heights(exact, q, d, rise)
+    steep = max(abs(exact[q, BOX]), max(abs(exact[q, BOX + 1]), abs(exact[q, BOX + 2])))
+    clear(rise, NOISE * steep * speed)
     if rise[0] == 0 or (side & FRONT and rise[0] * end > 0) or (side & BACK and rise[0] * end < 0):
         return
     for k in range(LONG):
         terms[k] = -low[k]
     terms[LONG] = end
     expand(terms, LONG + 1, low)
+    clear(low, NOISE * (steep * far + 0.5))
     t = divide(low[0], low[1], rise[0], rise[1])
     line_form(exact, q, f, d, form)
     n = put_products(terms, 0, 1.0, t, t)

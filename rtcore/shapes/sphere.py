@@ -12,7 +12,7 @@ import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
-from rtcore.expansions import LONG, expand
+from rtcore.expansions import LONG, expand, noise_of
 from rtcore.fields import Number, Vec, Vector
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
@@ -121,7 +121,7 @@ def settle_sphere(rays, i, p, table, q, opacity):
             terms[j] *= table.data[q, 5]
         expand(terms, 3, f[k])
         d[k, 0] = rays.ray[DX + k, i]
-    settle_one(rays, i, p, f, d, exact[q, 6], exact[q, 7], np.float64(table.data[q, 4]), table.side[q], opacity)
+    settle_one(rays, i, p, f, d, (0.0, 0.0, 0.0, 0.0), exact[q, 6], exact[q, 7], np.float64(table.data[q, 4]), table.side[q], opacity)
 
 
 @kernel
@@ -210,8 +210,8 @@ def settle_ellipsoid(rays, i, p, table, q, opacity):
     """Ray i against ellipsoid q, the slow and certain way."""
     out_of_line()
     f, d = np.empty((3, LONG)), np.empty((3, LONG))
-    line_expanded(rays.ray, i, table.exact, q, f, d)
-    settle_one(rays, i, p, f, d, 1.0, 0.0, 1.0, table.side[q], opacity)
+    far, speed = line_expanded(rays.ray, i, table.exact, q, f, d)
+    settle_one(rays, i, p, f, d, noise_of(f, d, far, speed, 1.0, 0.0, 1.0), 1.0, 0.0, 1.0, table.side[q], opacity)
 
 
 @kernel
