@@ -53,9 +53,11 @@ def spread(most, g, v, f, d):
 @inline
 def quick(rays, i, data, q):
     """Whether any of eight rays may meet the ball about torus q, by float32 arithmetic alone."""
-    g, v = load3(rays.ray, OX, i) - splat3(data, q, CENTER), load3(rays.ray, DX, i)
+    c = splat3(data, q, CENTER)
+    g, v = load3(rays.ray, OX, i) - c, load3(rays.ray, DX, i)
     f, d = into(data, q, g), into(data, q, v)
-    return any_lane(may_meet(closest(f, d, data[q, MAJOR] + data[q, MINOR], spread(data[q, MOST], g, v, f, d), U32)))
+    far = spread(data[q, MOST], g, v, f, d) + data[q, MOST] * extent(c)
+    return any_lane(may_meet(closest(f, d, data[q, MAJOR] + data[q, MINOR], far, U32)))
 
 
 @inline
