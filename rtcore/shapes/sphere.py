@@ -22,7 +22,7 @@ from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_m
 from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, unit_hit)
-from rtcore.wave import DX, OX, START, T, U, alive, record
+from rtcore.wave import DX, OX, START, T, U, alive, record, until
 
 
 MOST = OWN      # ellipsoids: column of the largest number of the matrix L into unit space
@@ -50,9 +50,10 @@ class Sphere(Shape, frozen=True):
             return Packed(SPHERE, np.array([[*center, radius / power, power, 1 / power]]), exact=np.array([exact], float))
         local = matrix @ np.diag([self.radius] * 3 + [1.0])
         local[:3, 3] = center
-        back = [x / Fraction(self.radius) for row in inverse(matrix) for x in row]
-        exact = [*parts(moved(matrix, self.center), 3), *parts(back, 3)]
-        return Packed(ELLIPSOID, placed(local, invertible(local), *parts([max(map(abs, back))], 1))[None], exact=np.array([exact]))
+        back = invertible(local)
+        into = [x / Fraction(self.radius) for row in inverse(matrix) for x in row]
+        exact = [*parts(moved(matrix, self.center), 3), *parts(into, 3)]
+        return Packed(ELLIPSOID, placed(local, back, *parts([max(map(abs, into))], 1))[None], exact=np.array([exact]))
 
 
 def round_scale(matrix: np.ndarray) -> float | None:
@@ -105,7 +106,7 @@ def meet(ray, i, data, exact, q, todo, far, near, side):
     f, f1 = vec3(x, y, z) * unpower, vec3(x1, y1, z1) * unpower
     end, zero = load(ray, T, i), 0 * x
     s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero,
-                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, wide(end) * unpower, side)
+                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, until(ray, i) * unpower, side)
     return rounded(s * np.float64(data[q, 4]), end), found, unsure
 
 
@@ -194,7 +195,7 @@ def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     most, end, zero = np.float64(data[q, MOST]), load(ray, T, i), 0 * f.x
     s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(splat3(exact, q, PLACE)),
-                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), wide(end), side)
+                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), until(ray, i), side)
     return rounded(s, end), found, unsure
 
 

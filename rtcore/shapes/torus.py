@@ -14,7 +14,7 @@ from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet
 from rtcore.shapes._torus import CONSTANTS, RADII, first_root, isolate, may_cross, settle
 from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
 from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, around, forward, into, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, T, record
+from rtcore.wave import DX, OX, START, T, record, until
 
 MAJOR, MINOR, MOST = OWN, OWN + 1, OWN + 2      # the radii in the unit shape's lengths; the largest number of the matrix L into it
 
@@ -72,7 +72,7 @@ def approach(ray, i, data, exact, q):
 @inline
 def window(ray, i):
     """The interval of eight rays, in float64."""
-    return wide(load(ray, START, i)), wide(load(ray, T, i))
+    return wide(load(ray, START, i)), until(ray, i)
 
 
 @kernel
