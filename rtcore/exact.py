@@ -1,6 +1,7 @@
 """Exact numbers for packing: floats are rationals, so what a kernel relies on is computed in rationals and rounded once, to two or three
 floats."""
 import functools
+import math
 from collections.abc import Iterable
 from fractions import Fraction
 
@@ -54,6 +55,15 @@ def inverse_parts(matrix: np.ndarray) -> np.ndarray:
 @functools.lru_cache(maxsize=4096)
 def _inverse_parts(linear: bytes) -> np.ndarray:
     return np.array(parts([x for row in _inverse(linear) for x in row], 3))
+
+
+def turned(matrix: np.ndarray, normal) -> list[Fraction]:
+    """The direction of a normal under a 4 x 4 matrix: the inverse transpose's product, its largest number brought to 1/2 .. 1 by a positive
+    factor that makes all of them binary fractions, which three floats mostly hold exactly."""
+    result = [dot(column, rationals(normal)) for column in zip(*inverse(matrix))]
+    whole = math.lcm(*(x.denominator for x in result))
+    numbers = [int(x * whole) for x in result]
+    return [Fraction(n, 1 << max(map(abs, numbers)).bit_length()) for n in numbers]
 
 
 def moved(matrix: np.ndarray, point) -> list[Fraction]:

@@ -3,14 +3,12 @@
 Height above it over the speed of falling, in plain float64 first, with a bound on their errors; then, for lanes that may hit, in
 double-double, with another; lanes for which that is not certain go one by one to sums in some hundred digits.
 
-Columns of Table.exact: three parts each of a point of the plane and of its normal, whose largest number is 1.
+Columns of Table.exact: three parts each of a point of the plane and of its normal, whose largest number is 1/2 .. 1.
 """
-from fractions import Fraction
-
 import numpy as np
 
-from rtcore.exact import dot as product, inverse, parts
-from rtcore.expansions import LONG, expand, put_products
+from rtcore.exact import parts, turned
+from rtcore.expansions import LONG, NOISE, clear, expand, put_products
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import dot, load, load3, rounded, size, splat3, wide
 from rtcore.pairs import add, divide, multiply, scale, two_sum
@@ -23,9 +21,7 @@ POINT, NORMAL = 0, 9
 
 def exact_plane(matrix: np.ndarray, point, normal) -> list[float]:
     """A row of Table.exact for the plane through a point of the world (rationals), its normal given in the space of the matrix."""
-    turned = [product(column, map(Fraction, normal)) for column in zip(*inverse(matrix))]
-    most = max(map(abs, turned))
-    return [*parts(point, 3), *parts([x / most for x in turned], 3)]
+    return [*parts(point, 3), *parts(turned(matrix, normal), 3)]
 
 
 @inline
@@ -99,5 +95,10 @@ def settle(rays, i, p, table, q, opacity):
         normal = exact[q, NORMAL + k], exact[q, NORMAL + 3 + k], exact[q, NORMAL + 6 + k]
         m = put_products(more, m, 1.0, normal, (np.float64(ray[DX + k, i]),))
     expand(more, m, speed)
+    pace, size = 0.0, 0.0
+    for k in range(3):
+        pace, size = pace + abs(ray[DX + k, i]), size + abs(ray[OX + k, i]) + abs(exact[q, POINT + k])
+    clear(speed, NOISE * pace)
+    clear(height, NOISE * size)
     if (speed[0] < 0 and table.side[q] != BACK) or (speed[0] > 0 and table.side[q] != FRONT):
         record_one(rays, i, p, divide(height[0], height[1], speed[0], speed[1])[0], opacity)

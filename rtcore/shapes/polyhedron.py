@@ -5,6 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import dot as product, moved, parts, rationals, turned
 from rtcore.fields import Field, FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
 from rtcore.lanes import dot, greatest, least, load, load3, rounded, select, splat3, wide
@@ -13,7 +14,8 @@ from rtcore.shapes.kind import FRONT, Kind, Packed, hit_from, put_surface
 from rtcore.wave import DX, OX, START, record
 
 MOST_PLANES = 64
-LOW, HIGH, FIRST, COUNT = 3, 6, 9, 10       # columns after the centre
+#: Columns after the centre. A plane's row of Table.extra: its normal, its height above the centre, the inverse of the normal's length.
+LOW, HIGH, FIRST, COUNT = 3, 6, 9, 10
 
 
 class Planes(Field):
@@ -43,29 +45,34 @@ class Polyhedron(Shape, frozen=True):
     planes: Annotated[tuple[tuple[Vec, Vec], ...], Planes(help="point and outward normal of each plane")]
 
     def check(self):
-        if extent(*half_spaces(self.planes, np.eye(4))) is None:
+        if extent(*half_spaces(self.planes)) is None:
             raise FieldError("planes with room behind all of them", [list(p) for p in self.planes], "planes")
 
     def kind(self, matrix: np.ndarray) -> Kind:
-        return POLYHEDRON if bounded(half_spaces(self.planes, np.eye(4))[1]) else OPEN_POLYHEDRON
+        return POLYHEDRON if bounded(half_spaces(self.planes)[1]) else OPEN_POLYHEDRON
 
     def pack(self, matrix: np.ndarray) -> Packed:
-        points, normals = half_spaces(self.planes, matrix)
-        low, high = extent(points, normals)
+        invertible(matrix)
+        points, normals = half_spaces(self.planes)
+        closed = bounded(normals)
+        corners = np.array(list(itertools.product(*zip(*extent(points, normals))))) @ matrix[:3, :3].T + matrix[:3, 3]
+        low, high = corners.min(0), corners.max(0)
         # heights of the planes above a point inside: small numbers for a small solid, wherever it is
-        center = low / 2 + high / 2 if bounded(normals) else points[0]
-        heights = ((points - center) * normals).sum(1)
+        center = low / 2 + high / 2 if closed else points[0] @ matrix[:3, :3].T + matrix[:3, 3]
+        rows = []
+        for point, normal in self.planes:
+            normal = rationals(parts(turned(matrix, normal), 1))
+            height = product(normal, [x - c for x, c in zip(moved(matrix, point), rationals(center))])
+            rows.append([*normal, height, 1 / np.linalg.norm(np.array(normal, float))])
         row = np.array([[*center, *low, *high, 0.0, len(points)]])
-        return Packed(self.kind(matrix), row, np.column_stack([normals, heights]), exact=center[None])
+        return Packed(POLYHEDRON if closed else OPEN_POLYHEDRON, row, np.array(rows, float), exact=center[None])
 
 
-def half_spaces(planes, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 3) and unit outward normals (n, 3) under a 4 x 4 matrix."""
-    points = np.array([p for p, _ in planes]) @ matrix[:3, :3].T + matrix[:3, 3]
+def half_spaces(planes) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) and unit outward normals (n, 3)."""
     normals = np.array([n for _, n in planes])
-    normals = (normals / np.abs(normals).max(1, keepdims=True)) @ invertible(matrix)[:3, :3]
-    normals /= np.abs(normals).max(1, keepdims=True)
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.abs(normals).max(1, keepdims=True)
+    return np.array([p for p, _ in planes]), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def bounded(normals: np.ndarray) -> bool:
@@ -154,16 +161,16 @@ def surface(rays, n, out, table, first):
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
-            cx, cy, cz = np.float64(data[q, 0]), np.float64(data[q, 1]), np.float64(data[q, 2])
+            cx, cy, cz = table.exact[q, 0], table.exact[q, 1], table.exact[q, 2]
             x, y, z = hit_from(rays, i, cx, cy, cz)
             # the face is the plane that the point is nearest to; the point is put onto it
             best, off, reach = 0, -np.inf, 0.0
             for k in range(int(data[q, FIRST]), int(data[q, FIRST] + data[q, COUNT])):
-                h = extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, 3]
-                reach = max(reach, abs(np.float64(extra[k, 3])))
+                h = (extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, 3]) * extra[k, 4]
+                reach = max(reach, abs(extra[k, 3] * extra[k, 4]))
                 if h > off:
                     best, off = k, h
-            nx, ny, nz = np.float64(extra[best, 0]), np.float64(extra[best, 1]), np.float64(extra[best, 2])
+            nx, ny, nz = extra[best, 0] * extra[best, 4], extra[best, 1] * extra[best, 4], extra[best, 2] * extra[best, 4]
             x, y, z = x - off * nx, y - off * ny, z - off * nz
             u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
             put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))) + reach)
