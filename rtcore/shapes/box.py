@@ -1,15 +1,19 @@
-"""Box: the unit cube -1 .. 1 by slabs, placed by a matrix."""
+"""Box: the unit cube -1 .. 1 by slabs, placed by a matrix; in plain float64 with a bound on its errors first, then in double-double."""
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.exact import inverse, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import greatest, least, load, load3, rounded, select, splat3, wide, with_sign
+from rtcore.lanes import any_lane, greatest, least, load, load3, rounded, select, size, splat3, wide, with_sign
+from rtcore.pairs import divide, ordered_sum, two_sum
 from rtcore.scene import Shape, invertible
-from rtcore.shapes.kind import CENTER, FRONT, Kind, Packed, forward, into, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, record
+from rtcore.shapes._ball import U64, extent
+from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
+from rtcore.shapes.kind import FRONT, OWN, Kind, Packed, forward, placed, placed_bounds, put_placed, unit_hit
+from rtcore.wave import DX, OX, START, alive, record, until
 
 
 class Box(Shape, frozen=True):
@@ -30,27 +34,85 @@ class Box(Shape, frozen=True):
         unit = np.diag([*(high - low) / 2, 1.0])
         unit[:3, 3] = low / 2 + high / 2
         local = matrix @ unit
-        row = placed(local, invertible(local))[None]
-        return Packed(BOX, row, exact=row)
+        back = invertible(local)
+        middle = [(p + q) / 2 for p, q in zip(rationals(low), rationals(high))]
+        half = [(q - p) / 2 for p, q in zip(rationals(low), rationals(high))]
+        into = [x / h for row, h in zip(inverse(matrix), half) for x in row]
+        exact = [*parts(moved(matrix, middle), 3), *parts(into, 3)]
+        return Packed(BOX, placed(local, back, *parts([max(map(abs, into))], 1))[None], exact=np.array([exact]))
 
 
 @inline
-def hit_cube(ray, i, exact, q, side):
-    """Where eight rays meet box q, a cube in its unit space, and whether they do; in float64. A ray in the plane of a face (0·inf, a NaN)
-    is left to the other slabs."""
-    o = into(exact, q, wide(load3(ray, OX, i)) - splat3(exact, q, CENTER))
-    d = into(exact, q, wide(load3(ray, DX, i)))
-    ix, iy, iz = 1 / d.x, 1 / d.y, 1 / d.z
-    one = 1 + 0 * d.x
-    # the face through which a slab is left; its counterpart is entered. A sign knows them apart where a minimum sees a NaN
-    x, y, z = with_sign(one, d.x), with_sign(one, d.y), with_sign(one, d.z)
-    enter = greatest((-z - o.z) * iz, greatest((-y - o.y) * iy, greatest((-x - o.x) * ix, -np.inf)))
-    leave = least((z - o.z) * iz, least((y - o.y) * iy, least((x - o.x) * ix, np.inf)))
-    start = load(ray, START, i)
-    t = select(enter > wide(start), enter, leave)
+def slab(f, v, blur):
+    """Where eight rays enter and leave -1 .. 1 in one axis, plainly, each moved outward by what that may be off: `blur` is a bound on the
+    error of f. A NaN, from a ray in the plane of a face, is for the caller to pass over."""
+    side = with_sign(1 + 0 * v, v)
+    enter, leave = (-side - f) / v, (side - f) / v
+    slack = blur / size(v)
+    return enter - slack - 2.0 ** -40 * size(enter), leave + slack + 2.0 ** -40 * size(leave)
+
+
+@inline
+def approach(ray, i, exact, q, most):
+    """Of eight rays, plainly: those that may meet box q, a cube in its unit space, in their interval."""
+    g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
+    f, d = into_plain(exact, q, g), into_plain(exact, q, v)
+    blur = 32 * U64 * (most * extent(g) + 1)
+    x0, x1 = slab(f.x, d.x, blur)
+    y0, y1 = slab(f.y, d.y, blur)
+    z0, z1 = slab(f.z, d.z, blur)
+    enter = greatest(z0, greatest(y0, greatest(x0, wide(load(ray, START, i)) - np.inf)))
+    leave = least(z1, least(y1, least(x1, 0 * blur + np.inf)))
+    return (enter <= leave) & (leave > wide(load(ray, START, i))) & (enter < until(ray, i)) & alive(ray, i)
+
+
+@inline
+def crossing(face, f, f1, v, v1):
+    """(face - f) / v in pairs."""
+    h, e = two_sum(face, -f)
+    h, e = ordered_sum(h, e - f1)
+    return divide(h, e, v, v1)
+
+
+@inline
+def later(enter, enter1, f, f1, v, v1):
+    """The later one of `enter` and where a slab is entered, in pairs. A ray along the slab is in it always or never."""
+    side = with_sign(1 + 0 * v, v)
+    t, t1 = crossing(-side, f, f1, v, v1)
+    along = v == 0
+    beside = (size(f) > 1) | ((size(f) == 1) & (f * f1 > 0))
+    t = select(along, select(beside, np.inf, 0 * f - np.inf), t)
+    more = (t > enter) | ((t == enter) & (t1 > enter1))
+    return select(more, t, enter), select(more, select(along, 0, t1), enter1)
+
+
+@inline
+def earlier(leave, leave1, f, f1, v, v1):
+    """The earlier one of `leave` and where a slab is left."""
+    side = with_sign(1 + 0 * v, v)
+    t, t1 = crossing(side, f, f1, v, v1)
+    less = ((t < leave) | ((t == leave) & (t1 < leave1))) & ~(v == 0)
+    return select(less, t, leave), select(less, t1, leave1)
+
+
+@inline
+def meet(ray, i, exact, q, todo, side):
+    """Where the lanes `todo` meet box q, in the rays' precision, and whether they do; in double-double. Rays that miss an edge by less than
+    2⁻⁹⁸ of the way count as touching it."""
+    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+    start, zero = load(ray, START, i), 0 * f.x
+    enter, enter1 = later(zero - np.inf, zero, f.x, f1.x, v.x, v1.x)
+    enter, enter1 = later(enter, enter1, f.y, f1.y, v.y, v1.y)
+    enter, enter1 = later(enter, enter1, f.z, f1.z, v.z, v1.z)
+    leave, leave1 = earlier(zero + np.inf, zero, f.x, f1.x, v.x, v1.x)
+    leave, leave1 = earlier(leave, leave1, f.y, f1.y, v.y, v1.y)
+    leave, leave1 = earlier(leave, leave1, f.z, f1.z, v.z, v1.z)
+    ok = todo & (enter < np.inf) & ((leave - enter) + (leave1 - enter1) >= -2.0 ** -98 * (size(enter) + size(leave)))
+    t = rounded(enter, start)
+    t = select(t > start, t, rounded(leave, start))
     if side != 0:
-        t = enter if side & FRONT else leave
-    return rounded(t, start), enter <= leave
+        t = rounded(enter, start) if side & FRONT else rounded(leave, start)
+    return t, ok
 
 
 @kernel
@@ -61,11 +123,14 @@ def intersect(rays, n, tree, table, first, opacity):
         node = next_leaf(walk, tree)
         while node >= 0:
             for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+                most = np.float64(table.data[q, OWN])
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        t, ok = hit_cube(rays.ray, i, table.exact, q, table.side[q])
-                        record(rays, i, first + q, t, ok, opacity)
+                        todo = approach(rays.ray, i, table.exact, q, most)
+                        if any_lane(todo):
+                            t, ok = meet(rays.ray, i, table.exact, q, todo, table.side[q])
+                            record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
