@@ -1,19 +1,22 @@
 """Box: the unit cube -1 .. 1 by slabs, placed by a matrix; in plain float64 with a bound on its errors first, then in double-double."""
+from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
-from rtcore.exact import inverse, moved, parts, rationals
+from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
 from rtcore.lanes import any_lane, greatest, least, load, load3, rounded, select, size, splat3, wide, with_sign
-from rtcore.pairs import divide, ordered_sum, two_sum
+from rtcore.pairs import divide, subtract
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U64, extent
-from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
+from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_in_pairs
 from rtcore.shapes.kind import FRONT, OWN, Kind, Packed, forward, placed, placed_bounds, put_placed, unit_hit
 from rtcore.wave import DX, OX, START, alive, record, until
+
+HALF = BEYOND       # columns of Table.exact: half the box's edges, in two parts
 
 
 class Box(Shape, frozen=True):
@@ -36,17 +39,18 @@ class Box(Shape, frozen=True):
         local = matrix @ unit
         back = invertible(local)
         middle = [(p + q) / 2 for p, q in zip(rationals(low), rationals(high))]
-        half = [(q - p) / 2 for p, q in zip(rationals(low), rationals(high))]
-        into = [x / h for row, h in zip(inverse(matrix), half) for x in row]
-        exact = [*parts(moved(matrix, middle), 3), *parts(into, 3)]
-        return Packed(BOX, placed(local, back, *parts([max(map(abs, into))], 1))[None], exact=np.array([exact]))
+        power = float(np.ldexp(1.0, np.frexp((high - low).max())[1]))     # the unit of length: what is a binary fraction stays one
+        half = [(q - p) / 2 / Fraction(power) for p, q in zip(rationals(low), rationals(high))]
+        into = inverse_parts(matrix) / power
+        exact = [*parts(moved(matrix, middle), 3), *into, *parts(half)]
+        return Packed(BOX, placed(local, back, np.abs(into[:9]).max())[None], exact=np.array([exact]))
 
 
 @inline
-def slab(f, v, blur):
-    """Where eight rays enter and leave -1 .. 1 in one axis, plainly, each moved outward by what that may be off: `blur` is a bound on the
-    error of f. A NaN, from a ray in the plane of a face, is for the caller to pass over."""
-    side = with_sign(1 + 0 * v, v)
+def slab(f, v, half, blur):
+    """Where eight rays enter and leave -half .. half in one axis, plainly, each moved outward by what that may be off: `blur` is a bound
+    on the error of f. A NaN, from a ray in the plane of a face, is for the caller to pass over."""
+    side = with_sign(half, v)
     enter, leave = (-side - f) / v, (side - f) / v
     slack = blur / size(v)
     return enter - slack - 2.0 ** -40 * size(enter), leave + slack + 2.0 ** -40 * size(leave)
@@ -54,43 +58,41 @@ def slab(f, v, blur):
 
 @inline
 def approach(ray, i, exact, q, most):
-    """Of eight rays, plainly: those that may meet box q, a cube in its unit space, in their interval."""
+    """Of eight rays, plainly: those that may meet box q in their interval."""
     g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
-    f, d = into_plain(exact, q, g), into_plain(exact, q, v)
+    f, d, half = into_plain(exact, q, g), into_plain(exact, q, v), splat3(exact, q, HALF)
     blur = 32 * U64 * (most * extent(g) + 1)
-    x0, x1 = slab(f.x, d.x, blur)
-    y0, y1 = slab(f.y, d.y, blur)
-    z0, z1 = slab(f.z, d.z, blur)
-    enter = greatest(z0, greatest(y0, greatest(x0, wide(load(ray, START, i)) - np.inf)))
+    x0, x1 = slab(f.x, d.x, half.x, blur)
+    y0, y1 = slab(f.y, d.y, half.y, blur)
+    z0, z1 = slab(f.z, d.z, half.z, blur)
+    enter = greatest(z0, greatest(y0, greatest(x0, 0 * blur - np.inf)))
     leave = least(z1, least(y1, least(x1, 0 * blur + np.inf)))
     return (enter <= leave) & (leave > wide(load(ray, START, i))) & (enter < until(ray, i)) & alive(ray, i)
 
 
 @inline
-def crossing(face, f, f1, v, v1):
+def crossing(face, face1, f, f1, v, v1):
     """(face - f) / v in pairs."""
-    h, e = two_sum(face, -f)
-    h, e = ordered_sum(h, e - f1)
-    return divide(h, e, v, v1)
+    h, h1 = subtract(face, face1, f, f1)
+    return divide(h, h1, v, v1)
 
 
 @inline
-def later(enter, enter1, f, f1, v, v1):
+def later(enter, enter1, f, f1, v, v1, half, half1):
     """The later one of `enter` and where a slab is entered, in pairs. A ray along the slab is in it always or never."""
-    side = with_sign(1 + 0 * v, v)
-    t, t1 = crossing(-side, f, f1, v, v1)
+    t, t1 = crossing(-with_sign(half, v), -half1 * with_sign(1 + 0 * v, v), f, f1, v, v1)
     along = v == 0
-    beside = (size(f) > 1) | ((size(f) == 1) & (f * f1 > 0))
+    sign = with_sign(1 + 0 * f, f)
+    beside = (sign * f - half) + (sign * f1 - half1) > 0
     t = select(along, select(beside, np.inf, 0 * f - np.inf), t)
     more = (t > enter) | ((t == enter) & (t1 > enter1))
     return select(more, t, enter), select(more, select(along, 0, t1), enter1)
 
 
 @inline
-def earlier(leave, leave1, f, f1, v, v1):
+def earlier(leave, leave1, f, f1, v, v1, half, half1):
     """The earlier one of `leave` and where a slab is left."""
-    side = with_sign(1 + 0 * v, v)
-    t, t1 = crossing(side, f, f1, v, v1)
+    t, t1 = crossing(with_sign(half, v), half1 * with_sign(1 + 0 * v, v), f, f1, v, v1)
     less = ((t < leave) | ((t == leave) & (t1 < leave1))) & ~(v == 0)
     return select(less, t, leave), select(less, t1, leave1)
 
@@ -100,13 +102,13 @@ def meet(ray, i, exact, q, todo, side):
     """Where the lanes `todo` meet box q, in the rays' precision, and whether they do; in double-double. Rays that miss an edge by less than
     2⁻⁹⁸ of the way count as touching it."""
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
-    start, zero = load(ray, START, i), 0 * f.x
-    enter, enter1 = later(zero - np.inf, zero, f.x, f1.x, v.x, v1.x)
-    enter, enter1 = later(enter, enter1, f.y, f1.y, v.y, v1.y)
-    enter, enter1 = later(enter, enter1, f.z, f1.z, v.z, v1.z)
-    leave, leave1 = earlier(zero + np.inf, zero, f.x, f1.x, v.x, v1.x)
-    leave, leave1 = earlier(leave, leave1, f.y, f1.y, v.y, v1.y)
-    leave, leave1 = earlier(leave, leave1, f.z, f1.z, v.z, v1.z)
+    half, half1, start, zero = splat3(exact, q, HALF), splat3(exact, q, HALF + 3), load(ray, START, i), 0 * f.x
+    enter, enter1 = later(zero - np.inf, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
+    enter, enter1 = later(enter, enter1, f.y, f1.y, v.y, v1.y, half.y, half1.y)
+    enter, enter1 = later(enter, enter1, f.z, f1.z, v.z, v1.z, half.z, half1.z)
+    leave, leave1 = earlier(zero + np.inf, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
+    leave, leave1 = earlier(leave, leave1, f.y, f1.y, v.y, v1.y, half.y, half1.y)
+    leave, leave1 = earlier(leave, leave1, f.z, f1.z, v.z, v1.z, half.z, half1.z)
     ok = todo & (enter < np.inf) & ((leave - enter) + (leave1 - enter1) >= -2.0 ** -98 * (size(enter) + size(leave)))
     t = rounded(enter, start)
     t = select(t > start, t, rounded(leave, start))
