@@ -136,7 +136,8 @@ def build(low: np.ndarray, high: np.ndarray, leaf_most: int) -> tuple[Tree, np.n
     """
     n = len(low)
     order = np.arange(n, dtype=np.int32)
-    center = np.float64(np.float32(0.5 * low.min(0) + 0.5 * high.max(0)))     # exact in either precision
+    # a number of either precision; any point near will do
+    center = np.float64(np.float32(np.clip(0.5 * low.min(0) + 0.5 * high.max(0), -1e38, 1e38)))
     half = float(max((high.max(0) - center).max(), (center - low.min(0)).max()))
     scale = 2.0 ** -np.ceil(np.log2(half)) if half > 0 else 1.0
     low, high = (low - center) * scale, (high - center) * scale
