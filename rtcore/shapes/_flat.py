@@ -95,10 +95,12 @@ def settle(rays, i, p, table, q, opacity):
         normal = exact[q, NORMAL + k], exact[q, NORMAL + 3 + k], exact[q, NORMAL + 6 + k]
         m = put_products(more, m, 1.0, normal, (np.float64(ray[DX + k, i]),))
     expand(more, m, speed)
-    pace, size = 0.0, 0.0
+    # a third part that is not 0 may have been rounded; then sums below what that leaves are 0
+    pace, size, turned, placed = 0.0, 0.0, False, False
     for k in range(3):
         pace, size = pace + abs(ray[DX + k, i]), size + abs(ray[OX + k, i]) + abs(exact[q, POINT + k])
-    clear(speed, NOISE * pace)
-    clear(height, NOISE * size)
+        turned, placed = turned or exact[q, NORMAL + 6 + k] != 0, placed or exact[q, POINT + 6 + k] != 0
+    clear(speed, NOISE * pace if turned else 0.0)
+    clear(height, NOISE * size if turned or placed else 0.0)
     if (speed[0] < 0 and table.side[q] != BACK) or (speed[0] > 0 and table.side[q] != FRONT):
         record_one(rays, i, p, divide(height[0], height[1], speed[0], speed[1])[0], opacity)

@@ -58,7 +58,7 @@ class Polyhedron(Shape, frozen=True):
         corners = np.array(list(itertools.product(*zip(*extent(points, normals))))) @ matrix[:3, :3].T + matrix[:3, 3]
         low, high = corners.min(0), corners.max(0)
         # heights of the planes above a point inside: small numbers for a small solid, wherever it is
-        center = low / 2 + high / 2 if closed else points[0] @ matrix[:3, :3].T + matrix[:3, 3]
+        center = brief(low / 2 + high / 2 if closed else points[0] @ matrix[:3, :3].T + matrix[:3, 3])
         rows = []
         for point, normal in self.planes:
             normal = rationals(parts(turned(matrix, normal), 1))
@@ -66,6 +66,12 @@ class Polyhedron(Shape, frozen=True):
             rows.append([*normal, height, 1 / np.linalg.norm(np.array(normal, float))])
         row = np.array([[*center, *low, *high, 0.0, len(points)]])
         return Packed(POLYHEDRON if closed else OPEN_POLYHEDRON, row, np.array(rows, float), exact=center[None])
+
+
+def brief(numbers: np.ndarray) -> np.ndarray:
+    """Numbers rounded to 20 bits: differences from them, and their products with short numbers, are exact."""
+    mantissa, exponent = np.frexp(numbers)
+    return np.ldexp(np.rint(mantissa * 2.0 ** 20), exponent - 20)
 
 
 def half_spaces(planes) -> tuple[np.ndarray, np.ndarray]:
