@@ -10,8 +10,8 @@ from rtcore import (Blob, Box, Cone, Cylinder, FieldError, Implicit, Mesh, Node,
                     Shear, Sphere, Torus, Translate, Triangle)
 from rtcore.scene import Shape
 
-from naive import crossings as twin
-from naive import mp
+from rtcore.reports.oracle import crossings as twin
+from rtcore.reports.oracle import mp
 
 BALL, RING = Sphere((0, 0, 0), 1), Torus(1, 0.25)
 X, Y, UP, DOWN = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)

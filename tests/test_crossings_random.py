@@ -16,7 +16,7 @@ import rtcore
 from rtcore import (Blob, Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Rotate, Scale, Scene, Shear,
                     Sphere, Torus, Translate, Triangle)
 
-from naive import crossings, mp
+from rtcore.reports.oracle import crossings, mp
 from test_shapes import EXAMPLES, rays_at, transform
 
 DTYPE = {"f64": np.float64, "f32": np.float32}

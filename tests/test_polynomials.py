@@ -13,7 +13,7 @@ from rtcore.algebra.polynomials import (changes_at, derivative, gcd, plus, quoti
                                         times, value)
 from rtcore.algebra.roots import Isolated, Rational, Surd, compare, nearest, real_roots
 
-from naive import mp
+from rtcore.reports.oracle import mp
 
 F64, F32 = (53, -1074), (24, -149)
 whole = st.integers(-2**70, 2**70)
