@@ -128,12 +128,16 @@ def numbers(shape) -> tuple:
 
 
 def _slopes(value, at):
-    """Partial derivatives of a function of a tuple."""
+    """Partial derivatives of a function of a tuple; 0 where a number can't be another: the exponent of something negative."""
     out = []
     for k, x in enumerate(at):
         h = STEP * (abs(x) if x != 0 else 1)
-        up, down = (value((*at[:k], x + sign * h, *at[k + 1:])) for sign in (1, -1))
-        out.append((up - down) / (2 * h))
+        try:
+            up, down = (value((*at[:k], x + sign * h, *at[k + 1:])) for sign in (1, -1))
+        except TypeError:       # complex numbers don't compare
+            up = down = mp.mpf(0)
+        slope = (up - down) / (2 * h)
+        out.append(slope if isinstance(slope, mp.mpf) else mp.mpf(0))
     return out
 
 
