@@ -12,6 +12,7 @@ from rtcore.views import VIEWS
 
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
+GLOW = "background, glow and ambient light"
 
 
 class Plan(NamedTuple):
@@ -60,6 +61,7 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     lights = tuple(light for light in shining if not isinstance(light, Ambient)) if answers else ()
     lit = VIEW[settings.view].needs_light
     lights = lights if lit else ()
+    _keep(stages, out, GLOW, [(lit, NO_LIGHT)])
     if lights:
         stages += sorted({f"light: {type(light).__name__.lower()}" for light in lights})
     else:

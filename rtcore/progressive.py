@@ -9,6 +9,7 @@ import os
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import NamedTuple
@@ -54,6 +55,7 @@ class Frame(NamedTuple):
     rays: dict[str, int]
     elapsed: float          # seconds of tracing
     done: bool
+    seconds: dict[tuple[str, str], float]   # where they went, all threads together: by (stage of the plan, kernel group)
 
 
 class Pass(NamedTuple):
@@ -159,6 +161,13 @@ class Render:
         counts = dict(zip(COUNTS, (int(c) for c in self.counts())))
         return {key: counts[key] for key in ("primary", "primary_hits", "shadow", "shadow_hits", "reflection", "refraction")}
 
+    def seconds(self) -> dict[tuple[str, str], float]:
+        """Where the threads' time went so far, by (stage of the plan, kernel group)."""
+        total = Counter()
+        for scratch in self.scratches:
+            total.update(dict(scratch.clock.seconds))       # a copy, for its thread may be adding to it
+        return dict(total)
+
     def frame(self, done: bool) -> Frame:
         """The picture as it is now."""
         width, height = self.settings.size
@@ -168,7 +177,7 @@ class Render:
         films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
         shown = VIEW[self.settings.view].draw(pixels, node, distance, normal, doubt)
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
-                     self.rays(), self.elapsed, done)
+                     self.rays(), self.elapsed, done, self.seconds())
 
 
 class Renderer:

@@ -1,4 +1,6 @@
 """The way of a wave: from the eye through hits, light, fog and bounces to the film. Stages that the plan left out do not occur."""
+import time
+from collections import defaultdict
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -8,7 +10,7 @@ from rtcore import film as films, fog as fogs, shading
 from rtcore.eye import cast
 from rtcore.flatten import Geometry
 from rtcore.lights import AIMS
-from rtcore.plan import VIEW, Plan
+from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
@@ -24,17 +26,37 @@ REFLECTION, REFRACTION, PRIMARY, PRIMARY_HITS, SHADOW, SHADOW_HITS, NONFINITE = 
 class Lamp(NamedTuple):
     """A light, ready for its kernel."""
 
+    name: str               # "point"
     aim: Callable
     numbers: np.ndarray
     color: np.ndarray
 
 
+class Clock:
+    """Where one thread's time goes. Two readings of the clock a step and wave, 0.1 us each, against milliseconds: it always runs."""
+
+    def __init__(self):
+        self.seconds: dict[tuple[str, str], float] = defaultdict(float)     # by (stage of the plan, kernel group)
+        self._since = 0.0
+
+    def start(self) -> None:
+        """What comes now counts, up to the next `lap`."""
+        self._since = time.perf_counter()
+
+    def lap(self, stage: str, kernels: str) -> None:
+        """Since the last lap these kernels ran for this stage."""
+        now = time.perf_counter()
+        self.seconds[stage, kernels] += now - self._since
+        self._since = now
+
+
 class Scratch:
-    """One thread's arrays, reused from tile to tile, and its counts."""
+    """One thread's arrays, reused from tile to tile, its counts and its clock."""
 
     def __init__(self, dtype):
         self.dtype = dtype
         self.counts = np.zeros(len(COUNTS), np.int64)
+        self.clock = Clock()
         self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
         self.waves: list[Wave] = []
         self.beam = new_beam(0, dtype)
@@ -74,69 +96,87 @@ class Tracer:
     def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, up, background: Background, fog: Fog | None):
         self.geometry, self.plan, self.settings, self.view = geometry, plan, settings, view
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
-        self.lamps = [Lamp(AIMS[type(light)], light.numbers(), np.multiply(light.color, light.intensity)) for light in plan.lights]
+        self.lamps = [Lamp(type(light).__name__.lower(), AIMS[type(light)], light.numbers(), np.multiply(light.color, light.intensity))
+                      for light in plan.lights]
         self.fog = fogs.numbers(fog) if plan.fog else None
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
         """Trace one sample of a tile (see `eye.cast`) onto the film; False if it was given up half way, the film then as before."""
         room = int(tile[2] * tile[3])
-        wave = scratch.primary(room)
+        wave, clock = scratch.primary(room), scratch.clock
+        clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
         if n == 0:
             return True
         counts = np.zeros_like(scratch.counts)
         scratch.sample[:, :n] = 0
-        self.hit(wave, n)
+        clock.lap("primary rays", "core")
+        self.hit(clock, wave, n)
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
         if sample == 0:
             films.note_first_hits(film, wave, n, scratch.target, self.geometry.leaf)
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
+            clock.lap("film", "core")
         if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale):
             return False
         counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
+        clock.lap("film", "core")
         scratch.counts += counts
         return True
 
     def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale) -> bool:
         """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
+        clock = scratch.clock
         for depth in range(1, self.settings.max_depth + 1):
             if depth > 1:
-                self.hit(wave, n)
+                self.hit(clock, wave, n)
             self._light(scratch, wave, n, counts)
             if self.fog is not None:
                 fogs.dim(wave, n, self.fog)
+                clock.lap("fog", "fog")
             films.deposit(wave, n, scratch.sample)
+            clock.lap("film", "core")
             if stale():
                 return False
             if not self.plan.bounces or depth == self.settings.max_depth:
                 return True
             child = scratch.wave(depth, 2 * n)
             n, wave = shading.bounce(wave, n, self.look, child, counts), child
+            clock.lap("reflected and refracted rays", "bounce")
             if n == 0:
                 return True
         return True
 
-    def hit(self, wave: Wave, n: int) -> None:
+    def hit(self, clock: Clock, wave: Wave, n: int) -> None:
         """Nearest hits and their surfaces."""
         for group in self.geometry.groups:
             group.kind.intersect(wave.rays, n, group.tree, group.table, group.first, CLOSEST)
+            clock.lap(f"hits: {group.kind.name}", group.kind.name)
         for group in self.geometry.groups:
             group.kind.surface(wave.rays, n, wave.surface, group.table, group.first)
+            clock.lap("surface at the hits", group.kind.name)
 
     def _light(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray) -> None:
+        clock = scratch.clock
         shading.glow(wave, n, self.look)
+        clock.lap(GLOW, "core")
         if not self.lamps:
             return
         beam = scratch.beams(n)
         for lamp in self.lamps:
+            stage = f"light: {lamp.name}"
             lamp.aim(wave, n, lamp.numbers, beam.aim)
+            clock.lap(stage, f"light-{lamp.name}")
             m = shading.light_up(wave, n, self.look, lamp.color, beam)
+            clock.lap(stage, "lit")
             if m == 0:
                 continue
             if self.plan.shadows:
                 for group in self.geometry.groups:
                     group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
+                    clock.lap("shadow rays", group.kind.name)
                 counts[SHADOW] += m
             counts[SHADOW_HITS] += shading.gather(wave, beam, m)
+            clock.lap(stage, "lit")

@@ -6,6 +6,7 @@ import pytest
 import rtcore
 from rtcore import Ambient, Camera, Checker, Directional, Fog, Material, Mesh, Node, Plane, Point, Scale, Scene, Sphere, Translate
 from rtcore.plan import plan
+from rtcore.progressive import Renderer, RenderRequest
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
 from rtcore.views import VIEWS
@@ -140,3 +141,18 @@ def test_counters_of_what_is_left_out_are_zero(settings, zero):
 def test_views_without_light_trace_one_sample():
     image = rtcore.render(scene(), (20, 10), 16, view="depth")
     assert image.stats["rays"]["primary"] == 200 and image.stats["samples_per_pixel"] == 1
+
+
+@pytest.mark.parametrize("name", ["empty", "plain", "full", "dark", "switched off", "shallow", "view normal"])
+def test_all_the_time_goes_into_stages_and_kernels_of_the_plan(name):
+    made, settings = VARIANTS[name]
+    renderer = Renderer()
+    try:
+        *_, last = renderer.frames(RenderRequest(made, CAMERA, Settings(size=(64, 48), threads=1, **settings)))
+    finally:
+        renderer.close()
+    composed = plan(made, Settings(**settings))
+    assert {stage for stage, _ in last.seconds} <= set(composed.stages)
+    assert {f"{kernels}.f64" for _, kernels in last.seconds} <= set(composed.kernels)
+    assert all(seconds > 0 for seconds in last.seconds.values())
+    assert sum(last.seconds.values()) <= last.elapsed

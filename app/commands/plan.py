@@ -1,8 +1,12 @@
 """`rayscope plan`: the stages that a scene needs and those it does not, with reasons and measured shares of time."""
+from collections import Counter
+
 from app.commands._shared import Parser, Refused, compile_missing, loaded, refusing, same_file, writable_or_refused, write_json
 
 NAME = "plan"
 HELP = "say which stages a scene needs, which are left out, and why"
+
+SIZE = (160, 120)       # of the picture on which the shares are measured
 
 
 def arguments(parser: Parser) -> None:
@@ -18,7 +22,6 @@ def run(args, parser: Parser) -> int:
         raise Refused(f"{args.json}: expected another file than the scene itself", 2)
     scene, _ = loaded(args.scene)
 
-    from app.commands._shares import measured
     from rtcore.flatten import flatten
     from rtcore.plan import plan
     from rtcore.settings import Settings
@@ -42,3 +45,21 @@ def run(args, parser: Parser) -> int:
     print(f"kernels: {', '.join(composed.kernels)}")
     print(f"geometry: {size / 2**20:.1f} MiB")
     return 0
+
+
+def measured(scene) -> dict[str, float]:
+    """Stage to its share of the time of tracing, 0 to 1, of those stages that can be told apart by time; they add up to 1."""
+    from rtcore.framing import framed
+    from rtcore.progressive import Renderer, RenderRequest
+    from rtcore.settings import Settings
+    request = RenderRequest(scene, framed(scene, SIZE[0] / SIZE[1]), Settings(size=SIZE, samples=2, threads=1))
+    renderer, shares = Renderer(), Counter()
+    try:
+        for _ in range(2):      # the first picture loads the kernels and builds the trees
+            *_, last = renderer.frames(request, coarse=False)
+    finally:
+        renderer.close()
+    total = sum(last.seconds.values())
+    for (stage, _), seconds in last.seconds.items():
+        shares[stage] += seconds / total
+    return shares

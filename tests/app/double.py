@@ -54,7 +54,7 @@ class Double:
             pixels, node, distance = picture(job, spacing)
             last = number + 1 == len(self.spacings)
             yield Frame(number, len(self.spacings), spacing, int(spacing == 1), pixels, node, distance, {"primary": node.size},
-                        time.monotonic() - started + 1e-6, last)
+                        time.monotonic() - started + 1e-6, last, {})
 
     def encode(self, pixels: np.ndarray, out: np.ndarray):
         out[..., 3] = 255
