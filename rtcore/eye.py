@@ -1,10 +1,21 @@
-"""Primary rays: a tile of the picture, or of a coarse lattice over it, as a wave."""
+"""Primary rays: a tile of the picture, of a coarse lattice over it, or a list of pixels, as a wave."""
 import numpy as np
 
-from rtcore.jit import kernel
+from rtcore.jit import inline, kernel
 from rtcore.sampling import jitter
 from rtcore.shapes.kind import normalized
 from rtcore.wave import finish, put_ray
+
+
+@inline
+def _put(wave, n, target, view, pixel, u, v):
+    """Primary ray n: through (u, v) pixels from the top left, for `pixel`."""
+    dx, dy, dz = normalized(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
+                            view[1, 2] + u * view[2, 2] + v * view[3, 2])
+    put_ray(wave.rays, n, view[0, 0], view[0, 1], view[0, 2], dx, dy, dz, np.inf)
+    wave.weight[0, n] = wave.weight[1, n] = wave.weight[2, n] = 1
+    wave.owner[n] = n
+    target[n] = pixel
 
 
 @kernel
@@ -27,13 +38,22 @@ def cast(wave, target, view, tile, sample, seed):
                     if x >= width or y >= height:
                         continue
                     u, v = jitter(y * width + x, sample, seed)
-                    u, v = u + x, v + y
-                    dx, dy, dz = normalized(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
-                                            view[1, 2] + u * view[2, 2] + v * view[3, 2])
-                    put_ray(wave.rays, n, view[0, 0], view[0, 1], view[0, 2], dx, dy, dz, np.inf)
-                    wave.weight[0, n] = wave.weight[1, n] = wave.weight[2, n] = 1
-                    wave.owner[n] = n
-                    target[n] = y * width + x
+                    _put(wave, n, target, view, y * width + x, u + x, v + y)
                     n += 1
+    finish(wave.rays, n)
+    return n
+
+
+@kernel
+def cast_list(wave, target, view, width, pixels, seed):
+    """Fill the wave with rays for a list of pixels and return their number; view and `target` as for `cast`. pixels (m, 3): a pixel's
+    number, its first sample and the one after its last. A pixel's samples follow one another, so that a packet is a narrow bundle."""
+    n = 0
+    for i in range(len(pixels)):
+        pixel, x, y = pixels[i, 0], pixels[i, 0] % width, pixels[i, 0] // width
+        for sample in range(pixels[i, 1], pixels[i, 2]):
+            u, v = jitter(pixel, sample, seed)
+            _put(wave, n, target, view, pixel, u + x, v + y)
+            n += 1
     finish(wave.rays, n)
     return n

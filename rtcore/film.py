@@ -1,19 +1,26 @@
-"""The film: sums of samples, so that films of different samples merge in any order, and what the first rays hit."""
+"""The film: sums of samples, so that films of different samples merge in any order, and what the first rays hit.
+
+Errors are root mean squares over pixels and channels, in linear light. They are estimated from the difference of the two replicates that a
+pixel's samples belong to (`rtcore.sampling`): those are independent, so the mean square of the difference of their means is the sum of
+their variances, however well each is stratified. It can't tell what no sample has met, nor anything that all samples have in common: what
+lies beyond the depth of reflections, or the rounding of float32.
+"""
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from rtcore.jit import kernel
+from rtcore.sampling import REPLICATES
 from rtcore.wave import NX, T
-
-LUMINANCE = (0.2126, 0.7152, 0.0722)    # of linear sRGB (Rec. 709)
 
 
 class Film(NamedTuple):
-    """One picture of h·w pixels, rows from the top."""
+    """One picture of h·w pixels, rows from the top. What tells of the error has length 0 in a film of one sample per pixel."""
 
     total: np.ndarray       # float64 (h·w, 3): sum of the samples
-    square: np.ndarray      # float64 (h·w): sum of their squared luminance
+    split: np.ndarray       # float32 (h·w, 3): sum of the first replicate's samples less that of the second's
+    square: np.ndarray      # float64 (h·w): sum of the samples' squares, the mean over the channels
     count: np.ndarray       # int32 (h·w): how many
     node: np.ndarray        # int32 (h·w): the leaf that sample 0 hit first, -1 none
     distance: np.ndarray    # float32 (h·w): how far away, inf none
@@ -21,11 +28,12 @@ class Film(NamedTuple):
     doubt: np.ndarray       # uint8 (h·w): 1 where that hit has no proof
 
 
-def new_film(width: int, height: int) -> Film:
-    """An empty film."""
+def new_film(width: int, height: int, samples: int = 2) -> Film:
+    """An empty film for so many samples per pixel."""
     n = width * height
-    return Film(np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int32), np.full(n, -1, np.int32), np.full(n, np.inf, np.float32),
-                np.zeros((n, 3), np.float32), np.zeros(n, np.uint8))
+    m = n if samples > 1 else 0
+    return Film(np.zeros((n, 3)), np.zeros((m, 3), np.float32), np.zeros(m), np.zeros(n, np.int32), np.full(n, -1, np.int32),
+                np.full(n, np.inf, np.float32), np.zeros((n, 3), np.float32), np.zeros(n, np.uint8))
 
 
 @kernel
@@ -68,8 +76,12 @@ def commit(film, sample, n, target):
         film.total[p, 0] += r
         film.total[p, 1] += g
         film.total[p, 2] += b
-        y = LUMINANCE[0] * r + LUMINANCE[1] * g + LUMINANCE[2] * b
-        film.square[p] += y * y
+        if film.square.shape[0] > 0:
+            side = np.float32(1 - 2 * (film.count[p] % REPLICATES))     # samples come in order, so the count is the sample's number
+            film.split[p, 0] += side * np.float32(r)
+            film.split[p, 1] += side * np.float32(g)
+            film.split[p, 2] += side * np.float32(b)
+            film.square[p] += (r * r + g * g + b * b) / 3
         film.count[p] += 1
     return bad
 
@@ -104,14 +116,27 @@ def fill(film, width, height, spacing, node, distance, normal, doubt):
                 normal[y, x, k] = film.normal[p, k]
 
 
+@kernel
+def _squared_errors(film):
+    """Sum of the estimated squared errors over pixels and channels, and how many pixels have an estimate."""
+    total, counted = 0.0, 0
+    for p in range(film.square.shape[0]):
+        n = film.count[p]
+        if n < REPLICATES:
+            continue
+        first, second = (n + 1) // 2, n // 2
+        for k in range(3):
+            t, s = film.total[p, k], np.float64(film.split[p, k])
+            apart = (t + s) / (2 * first) - (t - s) / (2 * second)
+            total += apart * apart * first * second / (np.float64(n) * n)
+        counted += 1
+    return total, counted
+
+
 def rmse_estimate(film: Film) -> float | None:
-    """Root mean square error of the mean picture's luminance as the samples' own spread tells it; None below two samples."""
-    n = film.count[film.count > 1].astype(np.float64)
-    if len(n) == 0:
-        return None
-    y = film.total[film.count > 1] @ np.array(LUMINANCE)
-    variance = np.maximum(film.square[film.count > 1] - y * y / n, 0) / (n - 1)
-    return float(np.sqrt((variance / n).mean()))
+    """Root mean square error of the mean picture, over pixels and channels, as its replicates tell it; None below two samples."""
+    total, counted = _squared_errors(film)
+    return math.sqrt(total / (3 * counted)) if counted else None
 
 
 def _curve() -> np.ndarray:

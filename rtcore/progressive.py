@@ -98,7 +98,7 @@ class Render:
         width, height = self.settings.size
         view = camera.rays(width, height)
         self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
-        self.film = films.new_film(width, height)
+        self.film = films.new_film(width, height, self.plan.samples)
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
         self.schedule = passes(self.plan.samples, coarse)
         self.weights = [len(one.samples) * (0.75 if one.skip else 1.0) / one.spacing ** 2 for one in self.schedule]

@@ -1,10 +1,18 @@
-"""Where in a pixel a sample lies: keyed on (pixel, sample), so the picture is the same for any order, tile and thread count."""
+"""Where samples lie: keyed on (pixel, sample, dimension, seed), so the picture is the same for any order, tile and thread count.
+
+Each pixel has REPLICATES sequences that know nothing of one another: sample s is point s // REPLICATES of sequence s % REPLICATES. Each is
+the Sobol (0, 2)-sequence under nested uniform (Owen) scrambling, done by a hash as in Burley, "Practical Hash-based Owen Scrambling"
+(JCGT 9(4), 2020): the first 2^k points of a sequence have one point in every box of area 2^-k with sides of powers of two. What the mean
+of one sequence differs from that of another by tells the error of their mean; how the samples of one sequence scatter would tell too much.
+
+Dimensions come in pairs. Pair 0 is where in the pixel the sample lies; its sample 0 is the pixel's centre: of all scramblings of the first
+sequence those are taken that bring its first point there, so it is one of the stratified points and counts as any other.
+"""
 import numpy as np
 
 from rtcore.jit import inline
 
-# The plastic number's powers: the R2 sequence (Roberts 2018) spreads any number of points evenly over the square.
-R2_X, R2_Y = 0.7548776662466927, 0.5698402909980532
+REPLICATES = 2      # more would tell the error better and make it larger: edges converge as R^(1/4) N^(-3/4)
 
 
 @inline
@@ -17,12 +25,62 @@ def hash32(x):
 
 
 @inline
+def mirrored(x):
+    """The 32 bits of x in reverse order."""
+    x = np.uint32(((x >> np.uint32(1)) & np.uint32(0x55555555)) | ((x & np.uint32(0x55555555)) << np.uint32(1)))
+    x = np.uint32(((x >> np.uint32(2)) & np.uint32(0x33333333)) | ((x & np.uint32(0x33333333)) << np.uint32(2)))
+    x = np.uint32(((x >> np.uint32(4)) & np.uint32(0x0F0F0F0F)) | ((x & np.uint32(0x0F0F0F0F)) << np.uint32(4)))
+    x = np.uint32(((x >> np.uint32(8)) & np.uint32(0x00FF00FF)) | ((x & np.uint32(0x00FF00FF)) << np.uint32(8)))
+    return np.uint32((x >> np.uint32(16)) | (x << np.uint32(16)))
+
+
+@inline
+def pascal(x):
+    """Pascal's triangle modulo 2 times the bits of x: the second Sobol dimension, its digits from the lowest bit up. The triangle is a
+    fivefold Kronecker power, so five steps do."""
+    x = np.uint32(x ^ ((x >> np.uint32(1)) & np.uint32(0x55555555)))
+    x = np.uint32(x ^ ((x >> np.uint32(2)) & np.uint32(0x33333333)))
+    x = np.uint32(x ^ ((x >> np.uint32(4)) & np.uint32(0x0F0F0F0F)))
+    x = np.uint32(x ^ ((x >> np.uint32(8)) & np.uint32(0x00FF00FF)))
+    return np.uint32(x ^ (x >> np.uint32(16)))
+
+
+@inline
+def scrambled(x, key):
+    """Nested uniform scrambling of the digits of x, the first in the lowest bit: whether a digit flips depends on the key and the digits
+    before it. The hash of Laine and Karras with Vegdahl's constants: every step lets a bit influence only itself and higher ones."""
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0x3D20ADEA)))
+    x = np.uint32(np.uint32(x + key) * ((key >> np.uint32(16)) | np.uint32(1)))
+    x = np.uint32(x ^ np.uint32(x * np.uint32(0x05526C56)))
+    return np.uint32(x ^ np.uint32(x * np.uint32(0x53A22864)))
+
+
+@inline
+def keys(pixel, sample, dimension, seed):
+    """Two keys of a pixel's sequence for a pair of dimensions."""
+    key = hash32(hash32(dimension * REPLICATES + sample % REPLICATES) ^ np.uint32(seed))
+    key = hash32(hash32(key + np.uint32(0x9E3779B9)) ^ np.uint32(pixel))
+    return key, hash32(key ^ np.uint32(0x68E31DA4))
+
+
+@inline
+def square(pixel, sample, dimension, seed):
+    """Two numbers in 0 .. 1, 1 not included, of a sample: for the pair of dimensions 1, 2 ... of what is sampled beside the pixel. Pairs
+    are independent: each goes through the sequence in an order of its own, which keeps the first 2^k points together."""
+    across, down = keys(pixel, sample, dimension, seed)
+    index = mirrored(scrambled(mirrored(np.uint32(sample // REPLICATES)), hash32(across ^ np.uint32(0x2545F491))))
+    x, y = mirrored(scrambled(index, across)), mirrored(scrambled(pascal(index), down))
+    return x * 2.0 ** -32, y * 2.0 ** -32
+
+
+@inline
 def jitter(pixel, sample, seed):
-    """Offset (x, y) in 0 .. 1 of a sample in its pixel. Sample 0 is the pixel's centre; the others follow R2 from a start
-    of the pixel's own."""
+    """Offset (x, y) in 0 .. 1 of a sample in its pixel. Sample 0 is the pixel's centre."""
     if sample == 0:
         return 0.5, 0.5
-    key = hash32(pixel * 2 + 1) ^ hash32(seed + 0x9E37)
-    u = hash32(key) * 2.0 ** -32 + sample * R2_X
-    v = hash32(key + 0x68E3) * 2.0 ** -32 + sample * R2_Y
-    return u - np.floor(u), v - np.floor(v)
+    across, down = keys(pixel, sample, 0, seed)
+    index = np.uint32(sample // REPLICATES)
+    x, y = scrambled(index, across), scrambled(pascal(index), down)
+    if sample % REPLICATES == 0:    # flip the digits so that point 0 comes to 0.1000...: this is a nested scrambling too
+        x, y = x ^ scrambled(np.uint32(0), across) ^ np.uint32(1), y ^ scrambled(np.uint32(0), down) ^ np.uint32(1)
+    return mirrored(np.uint32(x)) * 2.0 ** -32, mirrored(np.uint32(y)) * 2.0 ** -32

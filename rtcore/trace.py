@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore import film as films, fog as fogs, shading
-from rtcore.eye import cast
+from rtcore.eye import cast, cast_list
 from rtcore.flatten import Geometry
 from rtcore.lights import AIMS
 from rtcore.plan import GLOW, VIEW, Plan
@@ -102,18 +102,26 @@ class Tracer:
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
         """Trace one sample of a tile (see `eye.cast`) onto the film; False if it was given up half way, the film then as before."""
-        room = int(tile[2] * tile[3])
-        wave, clock = scratch.primary(room), scratch.clock
-        clock.start()
+        wave = scratch.primary(int(tile[2] * tile[3]))
+        scratch.clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
-        if n == 0:
-            return True
-        counts = np.zeros_like(scratch.counts)
+        return n == 0 or self._trace(scratch, film, wave, n, sample == 0, stale)
+
+    def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
+        """The same for further samples of a list of pixels (see `eye.cast_list`)."""
+        wave = scratch.primary(int((pixels[:, 2] - pixels[:, 1]).sum()))
+        scratch.clock.start()
+        n = cast_list(wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)
+        return self._trace(scratch, film, wave, n, False, stale)
+
+    def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, first: bool, stale: Callable[[], bool]) -> bool:
+        """Follow a wave of primary rays and add what it brings to the film; note what it hits if it holds its pixels' first samples."""
+        counts, clock = np.zeros_like(scratch.counts), scratch.clock
         scratch.sample[:, :n] = 0
         clock.lap("primary rays", "core")
         self.hit(clock, wave, n)
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
-        if sample == 0:
+        if first:
             films.note_first_hits(film, wave, n, scratch.target, self.geometry.leaf)
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:

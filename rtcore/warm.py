@@ -33,12 +33,14 @@ def _look():
 
 def _core(dtype):
     wave, target, n = _wave(dtype)
+    n = eye.cast_list(wave, target, Camera().rays(8, 8), 8, np.array([[p, 1, 2] for p in range(64)], np.int32), 0)
     film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
     shading.glow(wave, n, _look())
     films.note_first_hits(film, wave, n, target, np.zeros(0, np.int32))
     films.note_doubt(film, wave, n, target, 0, 0)
     films.deposit(wave, n, sample)
     films.commit(film, sample, n, target)
+    films.rmse_estimate(film)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, 8, 8, 1, pixels)
     films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
