@@ -1,0 +1,79 @@
+"""`rayscope bench`: how fast pictures and rays are, beside the rivals that are installed."""
+import sys
+
+from app.commands._progress import Progress
+from app.commands._shared import Parser, Refused, same_file, say, writable_or_refused, write_json
+from app.commands.render import interruptible
+
+NAME = "bench"
+HELP = "measure how fast pictures and rays are, beside other ray tracers"
+
+WIDTH = 150     # of the table where it goes to no terminal
+
+
+def arguments(parser: Parser) -> None:
+    """The options of the command."""
+    parser.add_argument("scenes", metavar="SCENE", nargs="*", help="scene or mesh files; without any, scenes of our own and the gallery")
+    parser.add_argument("-o", "--output", metavar="FILE.json", help="write the figures there as well")
+    parser.add_argument("--against", metavar="NAMES", default="", help="rivals, such as povray,tachyon,embree,mitsuba")
+    parser.add_argument("--quick", action="store_true", help="tiny pictures, one round: whether all of it works, not how fast it is")
+
+
+def run(args, parser: Parser) -> int:
+    """Measure, print the table, and write the figures; what there is of them if interrupted."""
+    from rtcore.files import FileError
+    from rtcore.reports.bench import report
+    from rtcore.reports.bench.jobs import WorkFailed
+    from rtcore.reports.bench.rivals import RIVALS
+    against = [name.strip() for name in args.against.split(",") if name.strip()]
+    for name in against:
+        if name not in RIVALS:
+            parser.error(f"argument --against: expected some of {', '.join(RIVALS)}, got {name!r}")
+    writable_or_refused(args.output)
+    for scene in args.scenes:
+        if same_file(scene, args.output):
+            raise Refused(f"{args.output}: expected another file than the scene itself", 2)
+
+    import resources
+    from app.gallery import GALLERY
+    ours = sorted((resources.ROOT / "meshes").glob("*.ply"))
+    machine, step = report.machine(against), None
+    with interruptible() as interrupted, Progress("measuring") as bar:
+        steps = report.run(args.scenes, against, [sys.executable, "-m", "app"], sorted(GALLERY.glob("*.yaml")), ours, args.quick)
+        try:
+            for step in steps:
+                bar.show(step.share, step.what)
+                if interrupted():
+                    break
+        except FileError as error:
+            raise Refused(error, 2) from None
+        except WorkFailed as error:
+            if not interrupted():
+                raise Refused(error, 1) from None
+        finally:
+            steps.close()
+    if interrupted() and (step is None or not step.rows):
+        raise Refused("interrupted before there was anything to tell", 130)
+    _show(step.rows, machine)
+    for note in step.notes:
+        say(note)
+    if args.output is not None:
+        write_json(args.output, report.as_data(step.rows, step.notes, machine))
+    return 130 if interrupted() else 0
+
+
+def _show(rows, machine: dict) -> None:
+    """The table and the machine, on stdout."""
+    from rich.console import Console
+    from rich.table import Table
+    table = Table(caption=", ".join(f"{name} {value}" for name, value in machine.items()), caption_justify="left")
+    for title, justify in (("work", "left"), ("ours", "right"), ("rival", "right"), ("", "left"), ("ratio", "right"), ("spread", "right"),
+                           ("target", "right"), ("met", "left")):
+        table.add_column(title, justify=justify, overflow="fold")
+    for row in rows:
+        rival = "" if row.rival is None else f"{row.rival:.3g} {row.unit}"
+        ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
+        met = "" if row.met is None else "yes" if row.met else "no"
+        table.add_row(row.work, f"{row.ours:.3g} {row.unit}", rival, row.rival_name or "", ratio, f"{row.spread:.0%}",
+                      row.target.words if row.target else "", met)
+    Console(width=None if sys.stdout.isatty() else WIDTH, markup=False, highlight=False).print(table)
