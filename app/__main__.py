@@ -4,8 +4,6 @@ Exit codes: 0 done, 1 the work failed, 2 wrong use or a bad input file, 130 inte
 """
 import os
 import sys
-from difflib import get_close_matches
-from importlib import metadata
 
 from app.commands import COMMANDS, render
 from app.commands._shared import Parser, Refused, say
@@ -55,6 +53,7 @@ def _run(argv: list[str]) -> int:
     parser.add_argument("--version", action="version", version=f"rayscope {_version()}")
     scene = parser.parse_args(argv).scene
     if scene is not None and "." not in scene and not os.path.exists(scene):
+        from difflib import get_close_matches
         near = "".join(f" (did you mean {word!r}?)" for word in get_close_matches(scene, commands, 1, 0.6))
         parser.error(f"expected a scene file or one of {', '.join(commands)}, got {scene!r}{near}")
     return _window(scene)
@@ -82,6 +81,7 @@ def has_display() -> bool:
 
 
 def _version() -> str:
+    from importlib import metadata
     try:
         return metadata.version("rayscope")
     except metadata.PackageNotFoundError:       # run from a checkout

@@ -7,7 +7,6 @@
 
 Shapes, lights and the parts of a scene are records to be made directly: `rtcore.Sphere((0, 0, 0), 1)`.
 """
-from rtcore.algebra.crossings import crossings
 from rtcore.api import Hits, Image, intersect, occluded, render
 from rtcore.camera import Camera
 from rtcore.fields import FieldError
@@ -21,3 +20,12 @@ __all__ = ["Ambient", "Background", "Blob", "Box", "Camera", "Checker", "Cone", 
            "Rotate", "Scale", "Scene", "Shear", "Sphere", "Torus", "Translate", "Triangle", "crossings", "intersect", "load", "occluded",
            "render", "save"]
 __version__ = "0.1.0"
+
+
+def __getattr__(name: str):
+    """What most programs never call is imported when it is first asked for: exact crossings bring the algebra with them."""
+    if name == "crossings":
+        from rtcore.algebra.crossings import crossings
+        globals()[name] = crossings
+        return crossings
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,15 +1,18 @@
 """The one kernel decorator, and the folder where compiled kernels are kept.
 
-numba's on-disk cache notices an edit only in the file of the kernel itself, not in the files it calls into. So every module
-gets a cache folder named by a hash of its own source, of all rtcore sources it imports, and of the compiler and processor:
-a kernel can never be stale, and an edit to one shape recompiles that shape alone.
+numba's own on-disk cache notices an edit only in the file of the kernel itself, not in the files it calls into; two processes that
+compile for one kernel at a time can lose or mix up what they write; and reading it sets up the whole compiler first. So kernels are kept
+by `Cache`. Every module gets a folder named by a hash of its own source, of all rtcore sources it imports, and of the compiler and
+processor: a kernel can never be stale, and an edit to one shape recompiles that shape alone.
 
 No fast-math flags anywhere: sums are contracted where a kernel says `fma` and nowhere else, so that a formula has the same
 bits wherever it is inlined. That is what makes a picture independent of tiles, packets and threads.
 """
+import contextlib
 import functools
 import hashlib
 import os
+import pickle
 import re
 import shutil
 import sys
@@ -22,12 +25,14 @@ import llvmlite.binding
 import numba
 import numpy
 import platformdirs
-from numba import config, njit, types
+from numba import njit, types
+from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 from numba.extending import intrinsic
 
 PACKAGE = Path(__file__).parent
 KEEP_DAYS = 30
-_in_use: set[Path] = set()      # cache folders of this process
 
 
 def _writable(folder: Path) -> bool:
@@ -79,30 +84,68 @@ def fingerprint(module: str) -> str:
 
 def cache_folder(module: str) -> Path:
     """The cache folder of one module's kernels."""
-    folder = cache_root() / f"{module.removeprefix('rtcore.')}-{fingerprint(module)}"
-    _in_use.add(folder)
-    return folder
+    return cache_root() / f"{module.removeprefix('rtcore.')}-{fingerprint(module)}"
 
 
 def prune() -> None:
-    """Remove kernel folders that no process has used for a month; reading a kernel leaves no trace in a folder's time, so this does."""
+    """Remove kernel folders that no process has used for a month."""
     for folder in cache_root().iterdir():
-        try:
-            if folder in _in_use:
-                os.utime(folder)
-            elif time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
+        with contextlib.suppress(OSError):      # another process was quicker
+            if time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
                 shutil.rmtree(folder, ignore_errors=True)
+
+
+class Cache:
+    """Where a dispatcher of numba's looks for compiled code and leaves it: a file a kernel and signature."""
+
+    def __init__(self, function):
+        if function.__closure__:
+            raise TypeError(f"{function.__qualname__}: a kernel that depends on variables around it can't be told from others on disk")
+        self._function = function
+
+    @functools.cached_property
+    def folder(self) -> Path:
+        """Worked out only once it is asked for: of most kernels a process never asks. It is marked as used, see `prune`."""
+        folder = cache_folder(self._function.__module__)
+        with contextlib.suppress(OSError):
+            os.utime(folder)
+        return folder
+
+    @property
+    def cache_path(self) -> str:
+        """The folder, as numba's statistics name it."""
+        return str(self.folder)
+
+    def _file(self, signature) -> Path:
+        name = f"{self._function.__name__}-{self._function.__code__.co_firstlineno}"
+        return self.folder / f"{name}-{hashlib.sha256(str(signature).encode()).hexdigest()[:16]}.kernel"
+
+    def load_overload(self, signature, target):
+        """The compiled code for a signature, or None. The compiler is not set up for it, which would take 0.2 s: `compile` does that."""
+        try:
+            data = self._file(signature).read_bytes()
         except OSError:
-            continue    # another process was quicker
+            return None
+        rtsys.initialize(target)        # what code calls that counts references
+        return CompileResult._rebuild(target, *pickle.loads(data))
+
+    def save_overload(self, signature, compiled) -> None:
+        """Keep it, written beside and renamed; a folder that can't be written is no reason not to go on."""
+        if compiled.library.has_dynamic_globals:
+            raise ValueError(f"{self._function.__qualname__} refers to addresses of this process, so it can't be kept")
+        path, data = self._file(signature), dumps(compiled._reduce())
+        beside = path.with_suffix(f".{os.getpid()}")
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            beside.write_bytes(data)
+            os.replace(beside, path)
 
 
 def kernel(function):
     """Compile at the first call, keep the machine code on disk, release the GIL while running; division by zero is IEEE's."""
-    before, config.CACHE_DIR = config.CACHE_DIR, str(cache_folder(function.__module__))
-    try:
-        return njit(cache=True, nogil=True, error_model="numpy", forceinline=False)(function)    # or it takes that over from a caller
-    finally:
-        config.CACHE_DIR = before
+    made = njit(nogil=True, error_model="numpy", forceinline=False)(function)       # or it takes that over from a caller
+    made._cache = Cache(function)
+    return made
 
 
 #: For the small functions that kernels are made of: always inlined, never cached on their own.

@@ -86,7 +86,7 @@ def python(*arguments, cache=None):
 def test_missing_and_compile(tmp_path):
     run = python("-c", COLD, cache=tmp_path)
     assert run.returncode == 0 and run.stdout == "well\n", run.stderr
-    assert any(tmp_path.rglob("*.nbi"))     # it went where it was told
+    assert any(tmp_path.rglob("*.kernel"))     # it went where it was told
     # a second process finds it
     again = python("-c", COLD, cache=tmp_path)
     assert again.returncode == 1 and "AssertionError: []" in again.stderr
@@ -109,7 +109,7 @@ def test_helper_process_refuses_unknown_names(tmp_path):
     run = python("-m", "rtcore.warm", "fog.f32", "fog.f16", "banana", cache=tmp_path)
     assert run.returncode == 2 and run.stdout == ""
     assert [line for line in run.stderr.splitlines() if "banana" in line] == ["rtcore.warm: no kernels are called fog.f16, banana"]
-    assert not any(tmp_path.rglob("*.nbi"))     # nothing was compiled before the mistake was found
+    assert not any(tmp_path.rglob("*.kernel"))     # nothing was compiled before the mistake was found
 
 
 def test_unknown_name_is_a_key_error():
@@ -121,22 +121,24 @@ def test_all_is_every_group_in_both_precisions():
     assert {f"{group}.{precision}" for group in GROUPS for precision in ("f32", "f64")} == set(ALL) and len(ALL) == len(set(ALL))
 
 
-def test_a_stale_folder_of_this_very_version_is_not_pruned(tmp_path):
-    """Kernels in use for longer than the time to keep must not be taken from under a marker that says they are there."""
-    code = ("import os, rtcore\nfrom rtcore import jit, warm\nfrom rtcore.settings import Settings\n"
-            "warm.compile_kernels(['fog.f32', 'plane.f32'])\n"
-            "folder = jit.cache_folder('rtcore.fog')\nos.utime(folder, (1, 1))\nprint(folder)\n")
-    first = python("-c", code, cache=tmp_path)
+def test_what_is_read_is_in_use(tmp_path):
+    """A folder's time is that of its last use; one that is pruned goes with the marks that say what is in it."""
+    code = ("import os, rtcore\nfrom rtcore import jit, warm\nwarm.compile_kernels([{names}])\n"
+            "folder = jit.cache_folder('rtcore.fog')\n{then}\n")
+    first = python("-c", code.format(names="'fog.f32', 'plane.f32'", then="os.utime(folder, (1, 1)); print(folder)"), cache=tmp_path)
     assert first.returncode == 0, first.stderr
-    again = python("-c", "import rtcore\nfrom rtcore import jit, warm\nwarm.compile_kernels(['plane.f32'])\n", cache=tmp_path)
-    assert again.returncode == 0, again.stderr
-    assert list(Path(first.stdout.strip()).rglob("*.nbi"))
+    folder = Path(first.stdout.strip())
+    assert python("-c", code.format(names="'fog.f32'", then=""), cache=tmp_path).returncode == 0
+    assert folder.stat().st_mtime > 1 and list(folder.glob("*.kernel"))
+    os.utime(folder, (1, 1))
+    assert python("-c", code.format(names="'plane.f64'", then=""), cache=tmp_path).returncode == 0
+    assert not folder.exists()
 
 
 def test_old_folders_of_other_versions_are_pruned(tmp_path):
     old = tmp_path / "kernels" / "fog-0123456789abcdef"
     old.mkdir(parents=True)
-    (old / "x.nbi").write_text("")
+    (old / "x.kernel").write_text("")
     os.utime(old, (1, 1))
     fresh = tmp_path / "kernels" / "fog-fedcba9876543210"
     fresh.mkdir()

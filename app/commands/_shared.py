@@ -118,12 +118,16 @@ def write_json(path: str, data: Any) -> None:
 
 
 def compile_missing(names: list[str], title: str = "compiling {} kernels, first run only") -> None:
-    """Compile these groups of kernels into the cache, with progress."""
+    """Compile these groups of kernels into the cache, with progress, on all cores."""
     if not names:
         return
-    from rtcore.warm import compile_kernels
+    from app.compiling import Compiler
     with Progress(title.format(len(names))) as bar:
-        compile_kernels(names, lambda done, total, name: bar.show(done / total, name.partition(".")[0]))
+        complaint = Compiler().compile(names, lambda state: bar.show(state.done / state.total, state.words))
+    if complaint:
+        from rtcore.warm import compile_kernels
+        say(f"helpers could not compile ({complaint}); going on without them")
+        compile_kernels(names)
 
 
 def enough_memory(width: int, height: int) -> None:

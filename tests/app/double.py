@@ -22,6 +22,7 @@ class Frame(NamedTuple):
     rays: dict
     elapsed: float
     done: bool
+    seconds: dict
 
 
 class Double:

@@ -113,7 +113,7 @@ def test_a_renderer_that_can_not_be_made_is_told(start, qtbot, capsys, monkeypat
     assert "no numba here" in capsys.readouterr().err
 
 
-HELPER = "import sys, time\nfor i, n in enumerate(sys.argv[1:]): print(i, len(sys.argv) - 1, n, flush=True); time.sleep(0.02)\n"
+HELPER = "import sys, time\nfor name in sys.stdin: time.sleep(0.02); print(name, end='', flush=True)\n"
 
 
 def test_missing_kernels_are_compiled_by_a_helper_first(start, qtbot, scene):
@@ -123,7 +123,25 @@ def test_missing_kernels_are_compiled_by_a_helper_first(start, qtbot, scene):
     with qtbot.waitSignal(worker.newest, timeout=10000):
         worker.submit(job(scene))
     qtbot.waitUntil(lambda: seen[-1] is None)
-    assert worker.compiling is None and len(seen) >= 3
+    assert worker.compiling is None and seen[-2:] != [None, None] and "plane" in "".join(filter(None, seen))
+
+
+def test_helpers_share_the_kernels_longest_first():
+    seen = []
+    names = ["fog.f64", "torus.f32", "core.f64", "torus.f64", "lit.f64"]
+    assert Compiler((sys.executable, "-u", "-c", HELPER), processes=2).compile(names, seen.append) == ""
+    assert seen[0] == (0, 5, ("torus.f64",)) and seen[1].names == ("torus.f64", "core.f64")
+    assert sorted({name for state in seen for name in state.names}) == sorted(names)
+    assert max(len(state.names) for state in seen) == 2
+    done = [state.done for state in seen]
+    assert done == sorted(done) and done[-1] == 4
+
+
+def test_one_helper_of_two_that_dies_is_told_and_ends_the_work():
+    dying = "import sys\nfor name in sys.stdin:\n if 'torus' in name: raise SystemExit('no torus today')\n print(name, flush=True)\n"
+    seen = []
+    complaint = Compiler((sys.executable, "-u", "-c", dying), processes=2).compile(["torus.f64", "fog.f64", "lit.f64"], seen.append)
+    assert complaint == "no torus today"
 
 
 def test_a_helper_that_fails_is_told_and_the_picture_comes_all_the_same(start, qtbot, scene, capsys):
@@ -140,7 +158,7 @@ def test_closing_kills_the_helper_within_a_second(qapp, qtbot, scene):
     helper = Compiler((sys.executable, "-c", "import time; time.sleep(60)"))
     worker = Worker(renderer_factory=lambda: Double(names=["sphere"]), compiler=helper)
     worker.submit(job(scene))
-    qtbot.waitUntil(lambda: worker._compiler._process is not None, timeout=5000)
+    qtbot.waitUntil(lambda: len(worker._compiler._processes) == 1, timeout=5000)
     began = time.monotonic()
     worker.close()
     assert time.monotonic() - began < 1.0 and not worker._thread.is_alive()
