@@ -162,18 +162,30 @@ def sampled(mp, node, at, o, d, low, high):
         f = value(node, FAST | dict(zip("xyz", (start[k] + t * step[k] for k in range(3)))))
     width = (high - low) / SAMPLES
     size = np.nanmax(np.abs(f), initial=0.0, where=np.isfinite(f))
+    for i in np.flatnonzero(np.abs(f) < 1e-9 * size).tolist():     # whose sign float64 may not know
+        f[i] = at(low + i * width)
     with np.errstate(invalid="ignore"):
         near = np.flatnonzero((f[:-1] * f[1:] <= 0) | (np.abs(f[:-1]) < 1e-3 * size))
+
+    def crossing(a, b):
+        t0, t1 = closed_in(mp, at, a, b)
+        if t0 is not None and abs(at((t0 + t1) / 2)) <= mp.mpf(10) ** -20 * size:
+            yield (t0 + t1) / 2
+
     for i in near.tolist():
         a, b = low + i * width, low + (i + 1) * width
         if f[i] * f[i + 1] < 0 or f[i] == 0 and i > 0 and f[i - 1] * f[i + 1] < 0:
-            t0, t1 = closed_in(mp, at, a if f[i] else a - width, b)
-            if t0 is not None and abs(at((t0 + t1) / 2)) <= mp.mpf(10) ** -20 * size:
-                yield (t0 + t1) / 2
+            yield from crossing(a if f[i] else a - width, b)
         elif i > 0 and abs(f[i]) < 1e-3 * size and abs(f[i - 1]) >= abs(f[i]) <= abs(f[i + 1]):
             t0, t1 = closed_in(mp, lambda t: mp.diff(at, t, h=mp.mpf(10) ** -22), a - width, b)
-            if t0 is not None and abs(at((t0 + t1) / 2)) <= mp.mpf(10) ** -30 * size:
-                yield from [(t0 + t1) / 2] * 2
+            if t0 is not None:      # it touches, passes by, or dips in and out between two samples
+                turn = (t0 + t1) / 2
+                deep = at(turn)
+                if abs(deep) <= mp.mpf(10) ** -30 * size:
+                    yield from [turn] * 2
+                elif deep * f[i] < 0 and f[i - 1] * f[i] > 0:
+                    yield from crossing(a - width, turn)
+                    yield from crossing(turn, b)
 
 
 def closed_in(mp, function, low, high):

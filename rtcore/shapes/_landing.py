@@ -1,14 +1,20 @@
-"""From hits on a formula's surface to points on it, with normals by exact derivatives and a bound on how far off the points may be."""
+"""From hits on a formula's surface to points on it, with normals by exact derivatives and a bound on how far off the points may be.
+
+Points are brought near by Newton steps on the intervals' middles. Where these values are so rough that the bound would be more than the
+rounding of the point, double-double takes a last step and gives the bound.
+"""
 from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline, kernel, out_of_line
 from rtcore.shapes._march import PAD, middle
+from rtcore.shapes._precise import new_rows, value_of
 from rtcore.shapes._tape import AT_ROWS, DIRECTION, INPUT, ROUGH, SLOPE, VALUE, new_registers, run
 
 LONGEST = 0.05              # a step toward the surface, and
 WORST = 2.0 ** -20          # what a point may be off where the surface has no slope, as shares of the box
+ROUGHLY = 2.0 ** -48        # as a share of the point's coordinates: a bound that double-double is called for
 BACK = 2.0 ** -13           # how far before it, on the ray, such a place is looked at for a normal
 
 
@@ -22,12 +28,14 @@ class Landing(NamedTuple):
     way: np.ndarray         # (3, 8): the rays' directions, of length 1
     normal: np.ndarray      # (3, 8)
     error: np.ndarray       # (8): bound on the distance of the point from the surface
+    rows: np.ndarray        # of the tape in double-double
+    closely: np.ndarray     # (3, 3): a point in double-double
 
 
 @kernel
 def new_landing():
     return Landing(new_registers(), np.zeros((AT_ROWS, 8)), np.zeros((6, 8)), np.zeros((3, 8)), np.zeros((3, 8)), np.zeros((3, 8)),
-                   np.zeros(8))
+                   np.zeros(8), new_rows(), np.zeros((3, 3)))
 
 
 @inline
@@ -61,6 +69,22 @@ def gradient(slope, j):
 
 
 @kernel
+def closer(code, landing, j, steep):
+    """Bring point j nearer by a Newton step, `steep` being the gradient's length there, and return a bound on what the value is then."""
+    out_of_line()
+    point, closely = landing.point, landing.closely
+    value = off = np.inf
+    for again in range(2):
+        for k in range(3):
+            closely[k, 0], closely[k, 1], closely[k, 2] = point[k, j], 0.0, 0.0
+        value, off = value_of(code, landing.rows, closely)
+        if again == 0 and off < np.inf:
+            for k in range(3):
+                point[k, j] -= value / steep * landing.normal[k, j]
+    return abs(value) + off
+
+
+@kernel
 def land(code, landing, box):
     """Bring the points onto the surface by Newton steps along the gradient; normals and error bounds there. box: the box's longest edge."""
     at, slope, point, way, normal, error = landing.at, landing.slope, landing.point, landing.way, landing.normal, landing.error
@@ -82,6 +106,8 @@ def land(code, landing, box):
         noise = max(abs(at[VALUE, j]), abs(at[VALUE + 1, j]))
         normal[0, j], normal[1, j], normal[2, j] = x, y, z
         error[j] = min(2 * noise / (steep - off), WORST * box) if steep > 4 * off else WORST * box
+        if ROUGHLY * max(abs(point[0, j]), max(abs(point[1, j]), abs(point[2, j]))) < error[j] < WORST * box:
+            error[j] = min(error[j], 2 * closer(code, landing, j, steep) / (steep - off))
         flat = flat or steep <= 4 * off
     if flat:
         for j in range(8):

@@ -9,18 +9,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import fma, greatest, least, load, size, store
+from rtcore.shapes._precise import new_rows, put_along, told, value_of
 from rtcore.shapes._tape import AT_ROWS, DIRECTION, GONE, INPUT, ROUGH, SLOPE, VALUE, new_registers, run
 from rtcore.shapes.kind import FRONT
 
-#: Rows of a local ray and of the state of a lane: base point and direction; then, along the ray by s = t - T0, where the search ends, its
-#: floor of resolution, and T0, FIRST and FAR in t; then the piece A .. B, a point, f at A (0 on the surface, where its sign is not known),
-#: the step, whether a single root is enclosed, and how many pieces were looked at.
-BASE, WAY, BEGIN, END, FLOOR, T0, FIRST, FAR, RAY_ROWS = 0, 3, 6, 7, 8, 9, 10, 11, 12
-A, B, POINT, AT_A, STEP, ENCLOSED, TRIES, STATE_ROWS = 12, 13, 14, 15, 16, 17, 18, 19
+#: Rows of a local ray and of the state of a lane: base point and direction, what these leave of the true ones, and what a point may be
+#: off beside its roundings; then, along the ray by s = t - T0, where the search begins and ends, its floor of resolution, and T0, FIRST and
+#: FAR in t; then the piece A .. B, a point, f at A (0 on the surface, where its sign is not known), the step, whether a single root is
+#: enclosed, and how many pieces were looked at.
+BASE, WAY, BASE_REST, WAY_REST, DRIFT = 0, 3, 6, 9, 12
+BEGIN, END, FLOOR, T0, FIRST, FAR, RAY_ROWS = 13, 14, 15, 16, 17, 18, 19
+A, B, POINT, AT_A, STEP, ENCLOSED, TRIES, STATE_ROWS = 19, 20, 21, 22, 23, 24, 25, 26
 
 PAD = 3 * 2.0 ** -53        # of base, direction, and the two roundings of a position
+CURVE = 2.0 ** 16           # widths at the floor to each side, over which a smooth value is a parabola
+NEAR = 2.0 ** 10            # floors from the start within which a root is polished: t is small there
 PATIENCE = 256              # pieces after which the floor rises, so that no formula keeps a ray for ever
 REACH = 32.0                # `settle` looks this much further with each lane
 
@@ -35,6 +40,8 @@ class Search(NamedTuple):
     probe: np.ndarray       # as state, at and point, of eight places on one ray
     probe_at: np.ndarray
     probe_point: np.ndarray
+    rows: np.ndarray        # of the tape in double-double
+    closely: np.ndarray     # (3, 3): a point in double-double
     whose: np.ndarray       # int64 (8): the ray of each lane, -1 none
     verdict: np.ndarray     # (4): what `settle` says
 
@@ -42,21 +49,51 @@ class Search(NamedTuple):
 @kernel
 def new_search():
     return Search(new_registers(), np.zeros((AT_ROWS, 8)), np.zeros((AT_ROWS, 8)), np.zeros((STATE_ROWS, 8)), np.zeros((STATE_ROWS, 8)),
-                  np.zeros((AT_ROWS, 8)), np.zeros((AT_ROWS, 8)), np.full(8, -1), np.zeros(4))
+                  np.zeros((AT_ROWS, 8)), np.zeros((AT_ROWS, 8)), new_rows(), np.zeros((3, 3)), np.full(8, -1), np.zeros(4))
 
 
 @inline
 def place(state, at, first, last):
     """The interval of positions between rows `first` and `last` of the state, whatever the rounding of the ray."""
     a, b = load(state, first, 0), load(state, last, 0)
-    far = greatest(size(a), size(b))
+    far, drift = greatest(size(a), size(b)), load(state, DRIFT, 0)
     for k in range(3):
         base, way = load(state, BASE + k, 0), load(state, WAY + k, 0)
         p, q = fma(a, way, base), fma(b, way, base)
-        slack = (size(base) + far * size(way)) * PAD
+        slack = fma(size(base) + far * size(way), PAD, drift)
         store(at, INPUT + 2 * k, 0, least(p, q) - slack)
         store(at, INPUT + 2 * k + 1, 0, greatest(p, q) + slack)
         store(at, DIRECTION + k, 0, way)
+
+
+@kernel
+def look_closely(code, search, state, k, s):
+    """The value at s on the true ray of lane k of a state, and a bound on its error, by double-double."""
+    out_of_line()
+    for axis in range(3):
+        put_along(search.closely, axis, state[BASE + axis, k], state[BASE_REST + axis, k], state[WAY + axis, k], state[WAY_REST + axis, k],
+                  s, state[DRIFT, k])
+    return value_of(code, search.rows, search.closely)
+
+
+@kernel
+def sign_at(code, search, state, k, s):
+    """The value at s on the true ray of lane k of a state, as near to 0 as it may be; 0 where even double-double can't tell its sign."""
+    out_of_line()
+    value, off = look_closely(code, search, state, k, s)
+    return told(value, off)
+
+
+@kernel
+def polish(code, search, k, s):
+    """Two Newton steps from s toward the only root in the piece of lane k."""
+    out_of_line()
+    state, slope = search.state, middle(search.at[SLOPE, k], search.at[SLOPE + 1, k])
+    for _ in range(2):
+        value, off = look_closely(code, search, state, k, s)
+        if off < np.inf:
+            s = min(max(s - value / slope, state[A, k]), state[B, k])
+    return s
 
 
 @inline
@@ -99,6 +136,28 @@ def bisect(code, search, low, high, sign, row):
 
 
 @kernel
+def touches(code, search, s, width, sign):
+    """Whether the value, of the given sign on both sides, may reach 0 about s, where its slope goes through 0 or jumps."""
+    out_of_line()
+    probe, point, h = search.probe, search.probe_point, CURVE * width
+    for i in range(8):
+        probe[A, i], probe[B, i] = s - 2 * width, s + 2 * width
+    place(probe, point, A, B)
+    run(code, search.reg, point, True)
+    if sure(point, 0) * sign > 0:
+        return False
+    # the bottom of the parabola through three values; at a kink, where the slope jumps by as much as it is, there is none
+    before, off = look_closely(code, search, probe, 0, s - h)
+    at, off1 = look_closely(code, search, probe, 0, s)
+    after, off2 = look_closely(code, search, probe, 0, s + h)
+    rise = sign * ((before - at) + (after - at))
+    if not (point[SLOPE + 1, 0] - point[SLOPE, 0]) * h < 0.01 * rise:
+        return True
+    below = (after - before) ** 2 / (8 * rise)
+    return not sign * at - below > 2.0 ** -10 * below + 8 * (off + off1 + off2)
+
+
+@kernel
 def settle(code, search, k):
     """What there is at the piece of lane k, which can't be cut further. Writes into search.verdict: whether there is a hit (1) or the
     search goes on (0), where, the value there if its sign is known, and the sign of the slope (0 of a touch)."""
@@ -133,16 +192,17 @@ def settle(code, search, k):
         if at[ROUGH, j] > 0:
             break
         there = sure(point, j) * sign
+        if there == 0:      # short of where the slope has turned, only the other sign tells
+            there = min(sign_at(code, search, probe, j, probe[POINT, j]) * sign, 0.0)
         turned = point[SLOPE, j] > 0 if sign > 0 else point[SLOPE + 1, j] < 0
         if turned and there >= 0:
-            s = bisect(code, search, a, probe[POINT, j], sign, SLOPE)
-            for i in range(8):
-                probe[A, i], probe[B, i] = s - 2 * width, s + 2 * width
-            place(probe, point, A, B)
-            run(code, search.reg, point, False)
-            f = sure(point, 0)
-            if f * sign >= 0:       # it touches, or it passes by
-                out[0], out[1], out[2] = 1.0 if f == 0 else 0.0, s, f
+            end = probe[POINT, j]
+            s = bisect(code, search, a, end, sign, SLOPE)
+            f = sign_at(code, search, probe, 0, s)
+            if f * sign >= 0:
+                out[1], out[2] = end, there * sign
+                if touches(code, search, s, width, sign):
+                    out[0], out[1], out[2] = 1.0, s, 0.0
                 return
             there = f * sign
             probe[POINT, j] = s
@@ -225,13 +285,17 @@ def march(code, search, rays, n, side, single, found, doubt, roots):
                 live -= whose[k] < 0
                 continue
             hit, proven, s, facing = False, True, 0.0, 0.0
-            if tries == 0:      # the first look: whether it starts on the surface
+            if tries == 0:      # the first look: on which side of the surface it starts
+                if f1 == 0:
+                    f1 = sign_at(code, search, state, k, a)
                 begin_at(state, k, a, f1, 0.25 * (state[END, k] - a))
                 continue
             if state[ENCLOSED, k] != 0:
                 if not enclose(search, k):
                     continue
                 hit, s, facing = True, state[POINT, k], 1.0 if d > 0 else -1.0
+                if s - state[BEGIN, k] < NEAR * state[FLOOR, k]:
+                    s = polish(code, search, k, s)
             else:
                 passed, share, h = at[GONE, k] > 0 or low > 0 or high < 0, 0.0, b - a
                 if not passed and not at[ROUGH, k] > 0:

@@ -17,7 +17,9 @@ from rtcore.pairs import add, multiply, two_product, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._formula import MOST_STEPS, compiled
 from rtcore.shapes._landing import land, new_landing
-from rtcore.shapes._march import BASE, BEGIN, END, FAR, FIRST, FLOOR, RAY_ROWS, T0, WAY, march, middle, new_search
+from rtcore.shapes._march import (BASE, BASE_REST, BEGIN, DRIFT, END, FAR, FIRST, FLOOR, RAY_ROWS, T0, WAY, WAY_REST, march, middle,
+                                  new_search)
+from rtcore.shapes._precise import ROUNDING
 from rtcore.shapes.kind import (FORWARD, INVERSE, OWN, REACH, Kind, Packed, Table, around, into1, normalized, placed, put_placed,
                                 unit_hit)
 from rtcore.wave import DX, ERR, OX, START, UNCERTIFIED, T, U, new_rays, record, until
@@ -90,13 +92,15 @@ def slab(o, d, low, high):
 
 @inline
 def inward(exact, q, row, v, w):
-    """Row of L times (v, w), a vector of pairs of lanes."""
+    """Row of L times (v, w), a vector of pairs of lanes, as a pair; and the sum of its terms' sizes, of which it is off by a few 2⁻¹⁰⁶."""
     k = INVERSE + 3 * row
     p, e = 0 * v[0], 0 * v[0]
+    total = p
     for j in range(3):
         s, f = multiply(0 * v[j] + exact[q, k + j], 0 * v[j] + exact[q, INVERSE_REST + 3 * row + j], v[j], w[j])
         p, e = add(p, e, s, f)
-    return p
+        total = total + size(s)
+    return p, e, total
 
 
 @inline
@@ -124,14 +128,20 @@ def bring(rays, i, exact, q, local, m):
     z, fz = add(z, fz, a, e)
     none = 0 * x
     enter, leave, fast, most = start - t0, far - t0, none, 0.0
+    place, speed = none, none
     for k in range(3):
-        base, way = inward(exact, q, k, (x, y, z), (fx, fy, fz)), inward(exact, q, k, (d.x, d.y, d.z), (none, none, none))
+        base, base1, off = inward(exact, q, k, (x, y, z), (fx, fy, fz))
+        way, way1, off1 = inward(exact, q, k, (d.x, d.y, d.z), (none, none, none))
+        place, speed = greatest(place, off), greatest(speed, off1)
         low, high = exact[q, LOW + k], exact[q, HIGH + k]
         near, past = slab(base, way, low, high)
         enter, leave, fast = greatest(enter, near), least(leave, past), greatest(fast, size(way))
         most = max(most, max(abs(low), abs(high)))
         store(local, BASE + k, m, base)
         store(local, WAY + k, m, way)
+        store(local, BASE_REST + k, m, base1)
+        store(local, WAY_REST + k, m, way1)
+    store(local, DRIFT, m, ROUNDING * (place + greatest(size(enter), size(leave)) * speed))
     store(local, BEGIN, m, enter)
     store(local, END, m, leave)
     store(local, FLOOR, m, most * 2.0 ** -49 / fast)
