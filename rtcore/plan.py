@@ -82,7 +82,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     kinds = tuple(sorted(counts, key=lambda k: k.name))
     names = ["core", *(["tree"] if any(s.startswith("tree") for s in stages) else []), *(k.name for k in kinds),
              *(f"light-{word}" for word in sorted({type(light).__name__.lower() for light in lights})), *(["lit"] if lights else []),
-             *(["fog"] if fog else []), *(["bounce"] if bounces else [])]
+             *(["fog"] if fog else []), *(["bounce"] if bounces else []),
+             *(["adaptive"] if lit and settings.samples > 1 and (settings.adaptive or VIEW[settings.view].needs_error) else [])]
     assert all(type(light) in AIMS for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, settings.samples if lit else 1)

@@ -22,15 +22,16 @@ except ImportError:     # Windows
     resource = None
 
 from rtcore import film as films
+from rtcore.adaptive import FIRST, GROWTH, POWER, refinement, squared_errors
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
 from rtcore.plan import VIEW, Plan, plan
 from rtcore.scene import Scene
+from rtcore.schedule import COARSEST, Pass, passes, tile_order, tiles, weight
 from rtcore.settings import Settings
 from rtcore.trace import COUNTS, NONFINITE, Scratch, Tracer
+from rtcore.views.view import Seen
 
-COARSEST = 16       # spacing of the first lattice
-TILE = 64           # lattice points along a tile's edge: 4,096 rays, some milliseconds
 PARTIAL = 0.25      # seconds after which a long pass shows what it has
 
 
@@ -48,7 +49,7 @@ class Frame(NamedTuple):
     number: int             # of the pass, from 0
     passes: int             # planned in all
     spacing: int            # of the lattice: 16, 8, 4, 2; 1 from then on
-    samples: int            # per pixel, complete; 0 while the lattice is coarse
+    samples: int            # of every pixel, complete; 0 while the lattice is coarse
     pixels: np.ndarray      # float32 (h, w, 3), linear; the frame's own
     node: np.ndarray        # int32 (h, w): leaf first hit, -1 none
     distance: np.ndarray    # float32 (h, w): from the eye, inf none
@@ -56,36 +57,9 @@ class Frame(NamedTuple):
     elapsed: float          # seconds of tracing
     done: bool
     seconds: dict[tuple[str, str], float]   # where they went, all threads together: by (stage of the plan, kernel group)
-
-
-class Pass(NamedTuple):
-    """What one pass traces."""
-
-    spacing: int
-    skip: bool              # what the lattice twice as coarse has already
-    samples: range
-
-
-def passes(samples: int, coarse: bool) -> list[Pass]:
-    """The schedule for a number of samples per pixel."""
-    spacing, result = COARSEST if coarse else 1, []
-    while spacing >= 1:
-        result.append(Pass(spacing, coarse and spacing < COARSEST, range(1)))
-        spacing //= 2
-    done = 1
-    while done < samples:
-        result.append(Pass(1, False, range(done, min(2 * done, samples))))
-        done = result[-1].samples.stop
-    return result
-
-
-def tiles(one: Pass, width: int, height: int) -> list[np.ndarray]:
-    """The pass's tiles as `eye.cast` takes them, from the middle of the picture outward."""
-    columns, rows = -(-width // one.spacing), -(-height // one.spacing)
-    corners = [(x, y) for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
-    corners.sort(key=lambda c: (c[0] + TILE / 2 - columns / 2) ** 2 + (c[1] + TILE / 2 - rows / 2) ** 2)
-    rest = (one.spacing, one.skip, width, height)
-    return [np.array([x, y, min(TILE, columns - x), min(TILE, rows - y), *rest], np.int64) for x, y in corners]
+    mean: float             # samples per pixel over the whole picture
+    error: float | None     # estimated root mean square error, in linear light; None below two samples
+    converged: bool         # it ended because no error is left that could be seen
 
 
 class Render:
@@ -100,8 +74,11 @@ class Render:
         self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
         self.film = films.new_film(width, height, self.plan.samples)
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
-        self.schedule = passes(self.plan.samples, coarse)
-        self.weights = [len(one.samples) * (0.75 if one.skip else 1.0) / one.spacing ** 2 for one in self.schedule]
+        self.adaptive = self.settings.adaptive and self.plan.samples > FIRST
+        self.schedule = passes(FIRST if self.adaptive else self.plan.samples, coarse)
+        self.order: np.ndarray | None = None
+        self.spent = 0.0        # samples per pixel of whole passes
+        self.converged = False  # nothing is left that could be seen
         self.prepared = time.perf_counter()
         self.number = 0         # of the pass
         self.samples = 0        # per pixel, complete
@@ -113,7 +90,7 @@ class Render:
         """Trace the current pass on the pool; yields None now and then while it runs and, at the end, whether it was finished. Closing
         the iterator, or an error in a thread, ends the threads' work first."""
         one = self.schedule[self.number]
-        queue = tiles(one, *self.settings.size)
+        queue, cost = tiles(one, *self.settings.size), weight(one, *self.settings.size)
         todo, halt = iter(queue), threading.Event()
         # time runs out only once every pixel has a sample
         deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
@@ -122,7 +99,7 @@ class Render:
         def stale() -> bool:
             return halt.is_set() or cancelled() or time.perf_counter() > deadline
 
-        shares = [pool.submit(self._work, scratch, one, todo, len(queue), stale) for scratch in self.scratches]
+        shares = [pool.submit(self._work, scratch, one, todo, cost / max(len(queue), 1), stale) for scratch in self.scratches]
         try:
             while wait(shares, PARTIAL, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
                 self.elapsed = time.perf_counter() - self.prepared
@@ -133,24 +110,45 @@ class Render:
             wait(shares)
             self.elapsed = time.perf_counter() - self.prepared
         finished = [share.result() for share in shares]     # an exception of a thread comes out here
-        if all(finished) and one.spacing == 1:
-            self.samples = one.samples.stop
+        if all(finished):
+            self.spent += cost
+            if one.spacing == 1 and one.pixels is None:
+                self.samples = one.samples.stop
         yield all(finished)
 
-    def _work(self, scratch: Scratch, one: Pass, todo: Iterator, count: int, stale: Callable[[], bool]) -> bool:
+    def _work(self, scratch: Scratch, one: Pass, todo: Iterator, each: float, stale: Callable[[], bool]) -> bool:
         """One thread's share of a pass: the next tile as long as there is one; False if it became stale."""
-        before, total = sum(self.weights[:self.number]), sum(self.weights)
         for tile in todo:
+            if one.pixels is not None and (stale() or not self.tracer.listed(scratch, self.film, tile, stale)):
+                return False
             for sample in one.samples:
                 if stale() or not self.tracer.tile(scratch, self.film, tile, sample, stale):
                     return False
-            self.progress = (before + next(self.done_tiles) / count * self.weights[self.number]) / total
+            self.progress = min((self.spent + next(self.done_tiles) * each) / self.plan.samples, 1.0)
         return True
 
-    def good_enough(self) -> bool:
-        """Whether the estimated error is as low as was asked for."""
-        estimate = films.rmse_estimate(self.film) if self.settings.error is not None else None
-        return estimate is not None and estimate <= self.settings.error
+    def goes_on(self) -> bool:
+        """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
+        target, growth = self.settings.error, GROWTH
+        if target is not None:
+            estimate = films.rmse_estimate(self.film)
+            if estimate is not None and estimate <= target:
+                return False
+            if estimate is not None:        # no more than is likely to be needed
+                growth = min(max((estimate / target) ** (2 / POWER) - 1, GROWTH / 8), GROWTH)
+        if self.number + 1 < len(self.schedule):
+            return True
+        if not self.adaptive:
+            return False
+        size = self.settings.size
+        if self.order is None:
+            self.order = tile_order(*size)
+        one = refinement(self.film, *size, self.order, self.plan.samples, growth)
+        self.converged = one is not None and len(one.pixels) == 0
+        if one is None or self.converged:
+            return False
+        self.schedule.append(one)
+        return True
 
     def counts(self) -> np.ndarray:
         """What all threads have counted so far."""
@@ -175,9 +173,12 @@ class Render:
         node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
         films.develop(self.film, width, height, COARSEST, pixels)
         films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
-        shown = VIEW[self.settings.view].draw(pixels, node, distance, normal, doubt)
+        view = VIEW[self.settings.view]
+        error = np.sqrt(squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
+        shown = view.draw(Seen(pixels, node, distance, normal, doubt, self.film.count.reshape(height, width), error))
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
-                     self.rays(), self.elapsed, done, self.seconds())
+                     self.rays(), self.elapsed, done, self.seconds(), float(self.film.count.mean()),
+                     films.rmse_estimate(self.film), self.converged)
 
 
 class Renderer:
@@ -224,19 +225,19 @@ class Renderer:
             self.close()
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
         self._compile, self._prepare = loaded - start, render.prepared - loaded
-        for number in range(len(render.schedule)):
+        number, done = 0, False
+        while not done:
             render.number = number
             for finished in render.trace(self._pool, cancelled):
                 if finished is None and not cancelled():
                     yield render.frame(False)
             if cancelled():
                 return
-            done = not finished or render.good_enough() or number == len(render.schedule) - 1
+            done = not (finished and render.goes_on())
             if done:
                 render.progress = 1.0
             yield render.frame(done)
-            if done:
-                return
+            number += 1
 
     def _composed(self, scene: Scene, settings: Settings) -> Plan:
         """The plan, made anew only for another scene or other settings, with all its kernels at hand: from the cache, or compiled."""
@@ -258,10 +259,12 @@ class Renderer:
         """The last request in the form of the command line's --stats, without what only the caller knows."""
         render = self._render
         settings = render.settings
+        count = render.film.count
+        samples = {"least": int(count.min()), "mean": round(float(count.mean()), 3), "most": int(count.max())}
         slow, uncertified = (int(x) for x in sum(scratch.tally() for scratch in render.scratches))
         traced = sum(count for name, count in render.rays().items() if not name.endswith("hits"))
         left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
-        return {"size": list(settings.size), "samples_per_pixel": int(render.film.count.min()), "precision": settings.precision,
+        return {"size": list(settings.size), "samples_per_pixel": samples["mean"] if render.adaptive else samples["least"], "samples": samples, "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),
                 "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed},
                 "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified": uncertified,

@@ -37,6 +37,7 @@ class Settings(Record, frozen=True, kw_only=True):
 
     size: Annotated[tuple[int, int], Size(help="width and height in pixels")] = (640, 480)
     samples: Annotated[int, Whole(1, 1 << 20, "samples per pixel")] = 16
+    adaptive: Annotated[bool, Flag(help="put them where the error is: `samples` is then the mean over the picture")] = False
     seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after this time")] = None
     error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop at this estimated root mean square error")] = None
     precision: Annotated[str, Choice(words=("f64", "f32"), help="of the geometry")] = "f64"

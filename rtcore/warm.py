@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import bvh, eye, film as films, fog as fogs, jit, shading
+from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.lights import AIMS
@@ -46,6 +46,10 @@ def _core(dtype):
     films.develop(film, 8, 8, 1, pixels)
     films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
     films.encode(pixels)
+
+
+def _adaptive(dtype):
+    adaptive.squared_errors(films.new_film(8, 8), 8, 8)
 
 
 def _tree(dtype):
@@ -91,7 +95,7 @@ def _kind(kind):
 #: Each group: the module whose source it hangs on, and how to compile it for a precision.
 GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit), "bounce": ("rtcore.shading", _bounce),
-    "fog": ("rtcore.fog", _fog),
+    "fog": ("rtcore.fog", _fog), "adaptive": ("rtcore.adaptive", _adaptive),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
 }

@@ -20,7 +20,8 @@ LAYERS = (
     {"rtcore.exact", "rtcore.expansions", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.wave"},
     {"rtcore.bvh", "rtcore.sampling", "rtcore.roots"},     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
-    {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film"},
+    {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film",
+     "rtcore.schedule", "rtcore.adaptive"},
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
     {"rtcore.algebra", "rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},

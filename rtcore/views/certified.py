@@ -6,9 +6,9 @@ from rtcore.views.view import View
 ORANGE = np.array((1.0, 0.25, 0.0), np.float32)
 
 
-def draw(pixels, node, distance, normal, doubt):
-    shown = np.repeat(0.6 * (pixels @ np.array((0.2126, 0.7152, 0.0722), np.float32))[:, :, None], 3, axis=2)
-    uncertain = (doubt != 0) & (node >= 0)
+def draw(seen):
+    shown = np.repeat(0.6 * (seen.pixels @ np.array((0.2126, 0.7152, 0.0722), np.float32))[:, :, None], 3, axis=2)
+    uncertain = (seen.doubt != 0) & (seen.node >= 0)
     shown[uncertain] = 0.3 * shown[uncertain] + 0.7 * ORANGE
     return shown
 

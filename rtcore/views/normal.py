@@ -4,9 +4,9 @@ import numpy as np
 from rtcore.views.view import View
 
 
-def draw(pixels, node, distance, normal, doubt):
-    shown = (0.5 + 0.5 * normal) ** np.float32(2.2)
-    shown[node < 0] = 0
+def draw(seen):
+    shown = (0.5 + 0.5 * seen.normal) ** np.float32(2.2)
+    shown[seen.node < 0] = 0
     return shown.astype(np.float32)
 
 

@@ -12,9 +12,9 @@ def palette(n: int) -> np.ndarray:
     return np.array(colors, np.float32).reshape(-1, 3)
 
 
-def draw(pixels, node, distance, normal, doubt):
-    colors = np.concatenate([palette(int(node.max(initial=-1)) + 1), np.zeros((1, 3), np.float32)])
-    return colors[node]     # -1, nothing, is the last row: black
+def draw(seen):
+    colors = np.concatenate([palette(int(seen.node.max(initial=-1)) + 1), np.zeros((1, 3), np.float32)])
+    return colors[seen.node]     # -1, nothing, is the last row: black
 
 
 OBJECT = View("object", "which object is seen", draw)
