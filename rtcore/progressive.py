@@ -21,8 +21,7 @@ try:
 except ImportError:     # Windows
     resource = None
 
-from rtcore import film as films
-from rtcore.adaptive import FIRST, GROWTH, POWER, refinement, squared_errors
+from rtcore import adaptive, film as films
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten
 from rtcore.plan import VIEW, Plan, plan
@@ -74,8 +73,8 @@ class Render:
         self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
         self.film = films.new_film(width, height, self.plan.samples)
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
-        self.adaptive = self.settings.adaptive and self.plan.samples > FIRST
-        self.schedule = passes(FIRST if self.adaptive else self.plan.samples, coarse)
+        self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
+        self.schedule = passes(adaptive.FIRST if self.adaptive else self.plan.samples, coarse)
         self.order: np.ndarray | None = None
         self.spent = 0.0        # samples per pixel of whole passes
         self.converged = False  # nothing is left that could be seen
@@ -127,15 +126,19 @@ class Render:
             self.progress = min((self.spent + next(self.done_tiles) * each) / self.plan.samples, 1.0)
         return True
 
+    def error(self) -> float | None:
+        """The estimated root mean square error, over pixels and channels; None below two samples."""
+        return adaptive.rmse_estimate(self.film, *self.settings.size) if self.adaptive else films.rmse_estimate(self.film)
+
     def goes_on(self) -> bool:
         """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
-        target, growth = self.settings.error, GROWTH
+        target, growth = self.settings.error, adaptive.GROWTH
         if target is not None:
-            estimate = films.rmse_estimate(self.film)
+            estimate = self.error()
             if estimate is not None and estimate <= target:
                 return False
             if estimate is not None:        # no more than is likely to be needed
-                growth = min(max((estimate / target) ** (2 / POWER) - 1, GROWTH / 8), GROWTH)
+                growth = min(max((estimate / target) ** (2 / adaptive.POWER) - 1, growth / 8), growth)
         if self.number + 1 < len(self.schedule):
             return True
         if not self.adaptive:
@@ -143,7 +146,7 @@ class Render:
         size = self.settings.size
         if self.order is None:
             self.order = tile_order(*size)
-        one = refinement(self.film, *size, self.order, self.plan.samples, growth)
+        one = adaptive.refinement(self.film, *size, self.order, self.plan.samples, growth)
         self.converged = one is not None and len(one.pixels) == 0
         if one is None or self.converged:
             return False
@@ -174,11 +177,11 @@ class Render:
         films.develop(self.film, width, height, COARSEST, pixels)
         films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
         view = VIEW[self.settings.view]
-        error = np.sqrt(squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
+        error = np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
         shown = view.draw(Seen(pixels, node, distance, normal, doubt, self.film.count.reshape(height, width), error))
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done, self.seconds(), float(self.film.count.mean()),
-                     films.rmse_estimate(self.film), self.converged)
+                     self.error(), self.converged)
 
 
 class Renderer:
@@ -264,13 +267,14 @@ class Renderer:
         slow, uncertified = (int(x) for x in sum(scratch.tally() for scratch in render.scratches))
         traced = sum(count for name, count in render.rays().items() if not name.endswith("hits"))
         left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
-        return {"size": list(settings.size), "samples_per_pixel": samples["mean"] if render.adaptive else samples["least"], "samples": samples, "precision": settings.precision,
+        return {"size": list(settings.size), "samples_per_pixel": samples["mean" if render.adaptive else "least"], "samples": samples,
+                "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),
                 "seconds": {"prepare": self._prepare, "compile": self._compile, "trace": render.elapsed},
                 "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified": uncertified,
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
-                "error": {"rmse_estimate": films.rmse_estimate(render.film)}}
+                "error": {"rmse_estimate": render.error()}}
 
 
 def cores() -> int:

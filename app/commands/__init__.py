@@ -3,6 +3,6 @@
 A command has NAME, HELP in one line, `arguments(parser)` and `run(args, parser) -> exit code`. None of them imports Qt, but for the plots
 of the reports where it is there.
 """
-from app.commands import bench, check, plan, render, stability, warm
+from app.commands import bench, check, convergence, plan, render, stability, warm
 
-COMMANDS = (render, plan, stability, bench, check, warm)
+COMMANDS = (render, plan, convergence, stability, bench, check, warm)

@@ -1,4 +1,5 @@
 """`rayscope render`: a picture of a scene, without a window."""
+import argparse
 import contextlib
 import signal
 import sys
@@ -40,6 +41,8 @@ def arguments(parser: Parser) -> None:
     end.add_argument("--spp", metavar="N", type=whole, help=f"samples per pixel (default {SAMPLES})")
     end.add_argument("--time", metavar="SECONDS", type=real, help="trace for this long; every pixel gets its first sample in any case")
     end.add_argument("--error", metavar="E", type=real, help="trace until the estimated root mean square error is this")
+    parser.add_argument("--adaptive", action=argparse.BooleanOptionalAction,
+                        help="put the samples where the error is (default: with --time and --error); --spp is then their mean")
     parser.add_argument("--precision", metavar="f32|f64", help="float type of the geometry (default f64)")
     parser.add_argument("--threads", metavar="N", type=whole, help="render threads (default: one per core)")
     parser.add_argument("--max-depth", metavar="N", type=whole, help="longest chain of rays, the eye's included (default 5)")
@@ -55,10 +58,11 @@ def run(args, parser: Parser) -> int:
     """Render, save the picture and the stats; what there is of them if interrupted."""
     start = time.perf_counter()
     samples = args.spp if args.spp is not None else SAMPLES if args.time is None and args.error is None else NO_END
+    adaptive = args.adaptive if args.adaptive is not None else args.time is not None or args.error is not None
     settings = settings_from(
-        parser, size=args.size, samples=samples, seconds=args.time, error=args.error, precision=args.precision, threads=args.threads,
-        max_depth=args.max_depth, shadows=not args.no_shadows, fog=not args.no_fog, reflections=not args.no_reflections, view=args.view,
-        seed=args.seed)
+        parser, size=args.size, samples=samples, adaptive=adaptive, seconds=args.time, error=args.error, precision=args.precision,
+        threads=args.threads, max_depth=args.max_depth, shadows=not args.no_shadows, fog=not args.no_fog,
+        reflections=not args.no_reflections, view=args.view, seed=args.seed)
     _check_outputs(args)
     enough_memory(*settings.size)
 
@@ -112,10 +116,10 @@ def trace(scene, camera, settings, interrupted):
         with Progress("rendering") as bar:
             for frame in renderer.frames(RenderRequest(scene, camera, settings), interrupted, coarse=False):
                 if settings.seconds is None:
-                    bar.show(renderer.progress, f"{frame.samples}{aim}")
+                    bar.show(renderer.progress, f"{frame.mean:.4g}{aim}")
                 else:
                     used = time.monotonic() - start
-                    bar.show(min(used / settings.seconds, 1.0), f"{frame.samples} samples", max(settings.seconds - used, 0.0))
+                    bar.show(min(used / settings.seconds, 1.0), f"{frame.mean:.4g} samples", max(settings.seconds - used, 0.0))
         if frame is None:
             return None, {}
         return frame.pixels if frame.done else renderer.picture(), renderer.stats()
