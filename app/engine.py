@@ -43,7 +43,7 @@ class Engine:
         through once, not at every step of a drag."""
         if self._warmed is not None and self._warmed[0] is job.scene and self._warmed[1] == job.options:
             return []
-        names = self._warm.missing(job.scene, self.request(job).settings)
+        names = self._warm.missing(job.scene, self.request(job).settings, screen=True)
         self._warmed = None if names else (job.scene, job.options)
         return names
 

@@ -2,6 +2,7 @@
 
 Primitives are numbered through all kinds, kinds by name and, within one, in the order of its tree's leaves.
 """
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -60,8 +61,12 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         owners.append(group.owner)
         first += len(group.owner)
         dropped += group.dropped
-    nbytes = sum(a.nbytes for g in groups for a in (*g.tree, *g.table))
-    return Geometry(tuple(groups), np.concatenate(owners), leaves, dropped, dtype, nbytes)
+    return Geometry(tuple(groups), np.concatenate(owners), leaves, dropped, dtype, nbytes((g.tree, g.table) for g in groups))
+
+
+def nbytes(arrays: Iterable) -> int:
+    """Bytes of arrays, of tuples of arrays and so on."""
+    return sum(a.nbytes if isinstance(a, np.ndarray) else nbytes(a) for a in arrays)
 
 
 def _same(a: tuple, b: tuple) -> bool:

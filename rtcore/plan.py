@@ -6,7 +6,7 @@ import numpy as np
 from rtcore.lights import AIMS, STUDIO, Ambient
 from rtcore.scene import Leaf, Light, Scene
 from rtcore.settings import Settings
-from rtcore.shapes import KINDS
+from rtcore.shapes import DOUBTFUL, KINDS
 from rtcore.shapes.kind import Kind
 from rtcore.views import VIEWS
 
@@ -80,10 +80,12 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1, "one sample per pixel was asked for")])
     stages.append("film")
     kinds = tuple(sorted(counts, key=lambda k: k.name))
-    names = ["core", *(["tree"] if any(s.startswith("tree") for s in stages) else []), *(k.name for k in kinds),
-             *(f"light-{word}" for word in sorted({type(light).__name__.lower() for light in lights})), *(["lit"] if lights else []),
-             *(["fog"] if fog else []), *(["bounce"] if bounces else []),
-             *(["adaptive"] if lit and settings.samples > 1 and (settings.adaptive or VIEW[settings.view].needs_error) else [])]
+    casting = sorted({type(light).__name__.lower() for light in lights})
+    wanted = {"core": True, "glow": lit, "samples": "further samples" in stages, "doubt": any(kind in DOUBTFUL for kind in kinds),
+              "tree": any(stage.startswith("tree: ") for stage in stages), **{kind.name: True for kind in kinds},
+              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
+              "adaptive": "further samples" in stages and (settings.adaptive or VIEW[settings.view].needs_error)}
+    names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in AIMS for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, settings.samples if lit else 1)

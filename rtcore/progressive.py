@@ -23,7 +23,7 @@ except ImportError:     # Windows
 
 from rtcore import adaptive, film as films
 from rtcore.camera import Camera
-from rtcore.flatten import DTYPES, Geometry, flatten
+from rtcore.flatten import DTYPES, Geometry, flatten, nbytes
 from rtcore.plan import VIEW, Plan, plan
 from rtcore.scene import Scene
 from rtcore.schedule import COARSEST, Pass, passes, tile_order, tiles, weight
@@ -55,10 +55,12 @@ class Frame(NamedTuple):
     rays: dict[str, int]
     elapsed: float          # seconds of tracing
     done: bool
+    plan: Plan
     seconds: dict[tuple[str, str], float]   # where they went, all threads together: by (stage of the plan, kernel group)
     mean: float             # samples per pixel over the whole picture
     error: float | None     # estimated root mean square error, in linear light; None below two samples
     converged: bool         # it ended because no error is left that could be seen
+    held: dict[str, int]    # bytes, by what for
 
 
 class Render:
@@ -128,6 +130,8 @@ class Render:
 
     def error(self) -> float | None:
         """The estimated root mean square error, over pixels and channels; None below two samples."""
+        if self.plan.samples < 2:
+            return None
         return adaptive.rmse_estimate(self.film, *self.settings.size) if self.adaptive else films.rmse_estimate(self.film)
 
     def goes_on(self) -> bool:
@@ -169,6 +173,12 @@ class Render:
             total.update(dict(scratch.clock.seconds))       # a copy, for its thread may be adding to it
         return dict(total)
 
+    def held(self) -> dict[str, int]:
+        """Bytes of the arrays of this render, by what they are for."""
+        groups = self.tracer.geometry.groups
+        return {"shapes": nbytes(group.table for group in groups), "trees": nbytes(group.tree for group in groups if group.has_tree),
+                "waves": sum(scratch.nbytes for scratch in self.scratches), "film": nbytes(self.film)}
+
     def frame(self, done: bool) -> Frame:
         """The picture as it is now."""
         width, height = self.settings.size
@@ -180,8 +190,8 @@ class Render:
         error = np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
         shown = view.draw(Seen(pixels, node, distance, normal, doubt, self.film.count.reshape(height, width), error))
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
-                     self.rays(), self.elapsed, done, self.seconds(), float(self.film.count.mean()),
-                     self.error(), self.converged)
+                     self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),
+                     self.converged, self.held())
 
 
 class Renderer:

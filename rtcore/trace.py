@@ -8,7 +8,7 @@ import numpy as np
 
 from rtcore import film as films, fog as fogs, shading
 from rtcore.eye import cast, cast_list
-from rtcore.flatten import Geometry
+from rtcore.flatten import Geometry, nbytes
 from rtcore.lights import AIMS
 from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
@@ -78,6 +78,11 @@ class Scratch:
             self.target, self.sample = np.empty(n, np.int32), np.empty((3, n), np.float32)
         return self.wave(0, n)
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all waves and of what belongs to them."""
+        return nbytes((self.waves, self.beam, self.target, self.sample))
+
     def tally(self) -> np.ndarray:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
         return sum((wave.rays.tally for wave in self.waves), self.tallied + self.beam.rays.tally)
@@ -145,7 +150,7 @@ class Tracer:
                 fogs.dim(wave, n, self.fog)
                 clock.lap("fog", "fog")
             films.deposit(wave, n, scratch.sample)
-            clock.lap("film", "core")
+            clock.lap("film", "glow")
             if stale():
                 return False
             if not self.plan.bounces or depth == self.settings.max_depth:
@@ -169,7 +174,7 @@ class Tracer:
     def _light(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray) -> None:
         clock = scratch.clock
         shading.glow(wave, n, self.look)
-        clock.lap(GLOW, "core")
+        clock.lap(GLOW, "glow")
         if not self.lamps:
             return
         beam = scratch.beams(n)

@@ -34,18 +34,33 @@ def _look():
 
 def _core(dtype):
     wave, target, n = _wave(dtype)
-    n = eye.cast_list(wave, target, Camera().rays(8, 8), 8, np.array([[p, 1, 2] for p in range(64)], np.int32), 0)
     film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
-    shading.glow(wave, n, _look())
     films.note_first_hits(film, wave, n, target, np.zeros(0, np.int32))
-    films.note_doubt(film, wave, n, target, 0, 0)
-    films.deposit(wave, n, sample)
     films.commit(film, sample, n, target)
-    films.rmse_estimate(film)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, 8, 8, 1, pixels)
     films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
-    films.encode(pixels)
+
+
+def _glow(dtype):
+    wave, _, n = _wave(dtype)
+    shading.glow(wave, n, _look())
+    films.deposit(wave, n, np.zeros((3, 64), np.float32))
+
+
+def _doubt(dtype):
+    wave, target, n = _wave(dtype)
+    films.note_doubt(films.new_film(8, 8), wave, n, target, 0, 0)
+
+
+def _samples(dtype):
+    wave, target, _ = _wave(dtype)
+    eye.cast_list(wave, target, Camera().rays(8, 8), 8, np.array([[p, 1, 2] for p in range(64)], np.int32), 0)
+    films.rmse_estimate(films.new_film(8, 8))
+
+
+def _screen(dtype):
+    films.encode(np.empty((8, 8, 3), np.float32))
 
 
 def _adaptive(dtype):
@@ -94,8 +109,10 @@ def _kind(kind):
 
 #: Each group: the module whose source it hangs on, and how to compile it for a precision.
 GROUPS: dict[str, tuple[str, Callable]] = {
-    "core": ("rtcore.warm", _core), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit), "bounce": ("rtcore.shading", _bounce),
-    "fog": ("rtcore.fog", _fog), "adaptive": ("rtcore.adaptive", _adaptive),
+    "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
+    "screen": ("rtcore.film", _screen), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
+    "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog),
+    "adaptive": ("rtcore.adaptive", _adaptive),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
 }
@@ -106,9 +123,10 @@ def _marker(name: str):
     return jit.cache_folder(GROUPS[name.split(".")[0]][0]) / f"{name}.warm"
 
 
-def missing(scene: Scene, settings: Settings) -> list[str]:
-    """Names of the kernel groups that this render needs and the cache lacks. Compiles nothing."""
-    return [name for name in plan(scene, settings).kernels if not _marker(name).exists()]
+def missing(scene: Scene, settings: Settings, screen: bool = False) -> list[str]:
+    """Names of the kernel groups that this render needs and the cache lacks, and its way to the screen if wanted. Compiles nothing."""
+    names = (*plan(scene, settings).kernels, *([f"screen.{settings.precision}"] if screen else []))
+    return [name for name in names if not _marker(name).exists()]
 
 
 #: Seconds that compiling takes, by group, where it is long.

@@ -25,6 +25,7 @@ LAYERS = (
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
     {"rtcore.algebra", "rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},
+    {"rtcore.account"},
     {"rtcore.api"},
     {"rtcore.solvers"},       # compared by the reports; the renderer knows its own kernels only
     {"rtcore.reports"},

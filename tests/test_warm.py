@@ -16,13 +16,13 @@ import rtcore
 from rtcore.settings import Settings
 from rtcore.warm import compile_kernels, missing
 scene = rtcore.Scene(objects=[rtcore.Plane((0, 0, 0), (0, 1, 0))], lights=[], camera=rtcore.Camera(lookfrom=(0, 1, -5)))
-settings = Settings(size=(16, 8), precision="f32")
-assert missing(scene, settings) == ["core.f32", "plane.f32"], missing(scene, settings)
+settings = Settings(size=(16, 8), precision="f32", samples=1)
+assert missing(scene, settings) == ["core.f32", "glow.f32", "plane.f32"], missing(scene, settings)
 steps = []
 compile_kernels(missing(scene, settings), lambda *step: steps.append(step))
-assert steps == [(0, 2, "core.f32"), (1, 2, "plane.f32"), (2, 2, "")], steps
+assert steps == [(0, 3, "core.f32"), (1, 3, "glow.f32"), (2, 3, "plane.f32"), (3, 3, "")], steps
 assert missing(scene, settings) == []
-assert missing(scene, Settings(precision="f64")) == ["core.f64", "plane.f64"]
+assert missing(scene, Settings(precision="f64", samples=1)) == ["core.f64", "glow.f64", "plane.f64"]
 print("well")
 """
 

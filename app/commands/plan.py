@@ -1,7 +1,6 @@
-"""`rayscope plan`: the stages that a scene needs and those it does not, with reasons and measured shares of time."""
-from collections import Counter
-
-from app.commands._shared import Parser, Refused, compile_missing, loaded, refusing, same_file, writable_or_refused, write_json
+"""`rayscope plan`: the stages and kernels that a scene needs and those it does not, with reasons and measured shares of time."""
+from app.commands._shared import (Parser, Refused, compile_missing, loaded, refusing, same_file, settings_from, writable_or_refused,
+                                  write_json)
 
 NAME = "plan"
 HELP = "say which stages a scene needs, which are left out, and why"
@@ -20,46 +19,48 @@ def run(args, parser: Parser) -> int:
     writable_or_refused(args.json)
     if same_file(args.json, args.scene):
         raise Refused(f"{args.json}: expected another file than the scene itself", 2)
+    settings = settings_from(parser, size=SIZE, samples=2, threads=1)
     scene, _ = loaded(args.scene)
 
-    from rtcore.flatten import flatten
-    from rtcore.plan import plan
-    from rtcore.settings import Settings
+    from rtcore.account import account, loaded_kernels, sentences
     from rtcore.warm import missing
     with refusing(args.scene):
-        compile_missing(missing(scene, Settings()))
-        composed = plan(scene, Settings())
-        shares = measured(scene)
-        size = flatten(scene).nbytes
+        compile_missing(missing(scene, settings))
+        frame = traced(scene, settings)
+    made, kernels = account(frame.plan, frame.seconds, frame.held), loaded_kernels()
     if args.json is not None:
-        write_json(args.json, {"stages": [{"name": stage, "share": shares.get(stage, 0.0)} for stage in composed.stages],
-                               "left_out": [{"stage": stage, "why": why} for stage, why in composed.left_out],
-                               "kernels": list(composed.kernels), "bytes": size})
-    width = max(map(len, (*composed.stages, *(stage for stage, _ in composed.left_out))))
-    print("kept, with the share of the time of tracing")
-    for stage in composed.stages:
-        print(f"  {stage:{width}}  {100 * shares[stage]:5.1f} %" if stage in shares else f"  {stage:{width}}  (within the others)")
+        write_json(args.json, {"stages": [{"name": kept.stage, "share": kept.share, **({"within": kept.within} if kept.within else {})}
+                                          for kept in made.kept],
+                               "left_out": [{"stage": stage, "why": why} for stage, why in made.left_out],
+                               "kernels": [name for name, _ in made.kernels], "bytes": made.bytes,
+                               "kernel_shares": dict(made.kernels), "loaded": kernels, "held": dict(made.held)})
+    print(*sentences(made), sep="\n")
+    width = max(map(len, (*frame.plan.stages, *(stage for stage, _ in made.left_out))))
+    print("\nkept, with the share of the time of tracing")
+    for kept in made.kept:
+        print(f"  {kept.stage:{width}}  " + (f"(within {kept.within})" if kept.within else f"{100 * kept.share:5.1f} %"))
     print("left out")
-    for stage, why in composed.left_out:
+    for stage, why in made.left_out:
         print(f"  {stage:{width}}  {why}")
-    print(f"kernels: {', '.join(composed.kernels)}")
-    print(f"geometry: {size / 2**20:.1f} MiB")
+    print("kernels")
+    for name, share in made.kernels:
+        print(f"  {name:{width}}  {100 * share:5.1f} %")
+    compiled = sum(how == "compiled" for how in kernels.values())
+    print(f"  in this process: {len(kernels) - compiled} functions loaded from the cache, {compiled} compiled")
+    print(f"held for a picture of {SIZE[0]} x {SIZE[1]} by one thread: {made.bytes / 2**20:.1f} MiB")
+    for what, size in made.held:
+        print(f"  {what:{width}}  {size / 2**10:,.0f} KiB")
     return 0
 
 
-def measured(scene) -> dict[str, float]:
-    """Stage to its share of the time of tracing, 0 to 1, of those stages that can be told apart by time; they add up to 1."""
+def traced(scene, settings):
+    """The last frame of a small picture, once its kernels are loaded and its trees are built."""
     from rtcore.framing import framed
     from rtcore.progressive import Renderer, RenderRequest
-    from rtcore.settings import Settings
-    request = RenderRequest(scene, framed(scene, SIZE[0] / SIZE[1]), Settings(size=SIZE, samples=2, threads=1))
-    renderer, shares = Renderer(), Counter()
+    request, renderer = RenderRequest(scene, framed(scene, SIZE[0] / SIZE[1]), settings), Renderer()
     try:
-        for _ in range(2):      # the first picture loads the kernels and builds the trees
+        for _ in range(2):
             *_, last = renderer.frames(request, coarse=False)
+        return last
     finally:
         renderer.close()
-    total = sum(last.seconds.values())
-    for (stage, _), seconds in last.seconds.items():
-        shares[stage] += seconds / total
-    return shares

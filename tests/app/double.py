@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from app.engine import Job
+from rtcore.plan import Plan, plan
+from rtcore.settings import Settings
 from rtcore.shapes import Sphere
 
 
@@ -22,7 +24,9 @@ class Frame(NamedTuple):
     rays: dict
     elapsed: float
     done: bool
+    plan: Plan
     seconds: dict
+    held: dict
 
 
 class Double:
@@ -55,7 +59,8 @@ class Double:
             pixels, node, distance = picture(job, spacing)
             last = number + 1 == len(self.spacings)
             yield Frame(number, len(self.spacings), spacing, int(spacing == 1), pixels, node, distance, {"primary": node.size},
-                        time.monotonic() - started + 1e-6, last, {})
+                        time.monotonic() - started + 1e-6, last, plan(job.scene, Settings(size=job.size, **job.options.settings())),
+                        {("primary rays", "core"): 0.25, ("hits: sphere", "sphere"): 0.75}, {"shapes": 1024})
 
     def encode(self, pixels: np.ndarray, out: np.ndarray):
         out[..., 3] = 255
