@@ -75,5 +75,5 @@ def _show(rows, machine: dict) -> None:
         ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
         met = "" if row.met is None else "yes" if row.met else "no"
         table.add_row(row.work, f"{row.ours:.3g} {row.unit}", rival, row.rival_name or "", ratio, f"{row.spread:.0%}",
-                      row.target.words if row.target else "", met)
+                      row.target.words(row.unit) if row.target else "", met)
     Console(width=None if sys.stdout.isatty() else WIDTH, markup=False, highlight=False).print(table)

@@ -1,4 +1,5 @@
 """A mesh of some hundred thousand triangles to measure with, and rays to trace through it."""
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -6,6 +7,8 @@ import numpy as np
 
 from rtcore.api import intersect
 from rtcore.camera import Camera
+from rtcore.framing import framed
+from rtcore.lights import Point
 from rtcore.scene import Scene
 from rtcore.shapes import Mesh, Triangle
 
@@ -63,6 +66,13 @@ def of_scene(scene: Scene) -> Triangles | None:
     return mesh
 
 
+def filling(mesh: Triangles) -> Camera:
+    """A camera whose square picture the mesh fills, as far as its shape lets it."""
+    camera = framed(mesh.scene())
+    left, up, ahead = camera.basis() @ (mesh.vertices - camera.lookfrom).T
+    return camera.at(fov=2 * math.degrees(math.atan(1.02 * max(np.abs(left / ahead).max(), np.abs(up / ahead).max()))))
+
+
 def primary(camera: Camera, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Origins and directions (count, 3) float32 of the eye rays of a square picture, tile by tile. count: a power of four."""
     side = round(count ** 0.5)
@@ -94,7 +104,7 @@ def differing(scene: Scene, origins: np.ndarray, directions: np.ndarray, theirs:
     return float(1 - same.mean())
 
 
-def above(camera: Camera) -> tuple[float, float, float]:
-    """Where a light stands that shines past the eye's right shoulder."""
+def lamp(camera: Camera) -> Point:
+    """A light that shines past the eye's right shoulder."""
     left, up, _ = camera.basis()
-    return tuple((np.array(camera.lookfrom) + camera.distance() * (0.6 * up - 0.5 * left)).tolist())
+    return Point(position=camera.lookfrom + camera.distance() * (0.6 * up - 0.5 * left), intensity=2 * camera.distance() ** 2)

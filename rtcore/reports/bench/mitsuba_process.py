@@ -28,7 +28,7 @@ def main(path: str) -> None:
             "to_world": mitsuba.ScalarTransform4f().look_at(origin=told["lookfrom"], target=told["lookat"], up=told["up"]),
             "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}},
             "sampler": {"type": "independent", "sample_count": 1}},
-        "light": {"type": "point", "position": told["light"], "intensity": {"type": "rgb", "value": [1.0, 1.0, 1.0]}},
+        "light": {"type": "point", "position": told["light"], "intensity": {"type": "rgb", "value": [told["intensity"]] * 3}},
         "mesh": {"type": "ply", "filename": told["mesh"], "face_normals": True,
                  "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}})
     for number, _ in enumerate(sys.stdin):

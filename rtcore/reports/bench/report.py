@@ -16,6 +16,9 @@ from rtcore.reports.bench.timing import Row
 from rtcore.scene import Scene
 
 
+BUSY = 0.7      # load at which others are at work
+
+
 class Step(NamedTuple):
     """How far the work is (0 .. 1), what comes next, and the rows and remarks that the work so far has brought."""
 
@@ -47,6 +50,8 @@ def run(scenes: Iterable[str | os.PathLike], against: Iterable[str], command: li
         for rival in RIVALS:
             if rival in against and rival not in there:
                 bench.note(f"{RIVALS[rival].title} is not installed ({RIVALS[rival].install}): nothing is compared with it")
+        if hasattr(os, "getloadavg") and os.getloadavg()[0] > BUSY:
+            bench.note(f"the machine was busy when this began (load {os.getloadavg()[0]:.1f}): the figures are rough")
         scenes = [Path(scene) for scene in scenes]
         todo = list(_of_scenes(bench, scenes) if scenes else _of_our_own(bench, gallery, own_meshes))
         rows, done, total = [], 0.0, sum(job.cost for job in todo)
@@ -81,9 +86,9 @@ def _of_our_own(bench: jobs.Bench, gallery: Iterable[Path], own_meshes: Iterable
         yield _picture(bench, path, True)
         if database is databases.DATABASES[0]:
             yield _threads(bench, path)
-    leaves = tuple(node for path in own_meshes for node in load(path).objects)
-    if leaves:
-        yield from _of_mesh(bench, "mesh", meshes.of_scene(Scene(objects=leaves)))
+    shapes = tuple(leaf.shape for path in own_meshes for leaf in load(path).leaves())
+    if shapes:
+        yield from _of_mesh(bench, "snail", meshes.of_scene(Scene(objects=shapes)))
     yield Job("start-up", 15, lambda: jobs.start(bench))
     yield Job("build", 25, lambda: jobs.build(bench))
     yield Job("sphereflakes", 30, lambda: jobs.flakes(bench))
@@ -100,7 +105,7 @@ def _threads(bench: jobs.Bench, path: Path) -> Job:
 
 
 def _of_mesh(bench: jobs.Bench, name: str, mesh: meshes.Triangles) -> Iterator[Job]:
-    title = f"{name} of {len(mesh.faces):,} triangles"
+    title = f"{name}, {len(mesh.faces):,} triangles"
     yield Job(f"rays through {name}", 40, lambda: jobs.rays(bench, title, mesh))
     yield Job(f"direct light on {name}", 20, lambda: jobs.direct(bench, title, mesh))
 
@@ -125,5 +130,5 @@ def _processor() -> str:
 
 def as_data(rows: Iterable[Row], notes: list[str], told: dict) -> dict:
     """The report as what its JSON file holds."""
-    plain = [{**one._asdict(), "target": one.target.words if one.target else None} for one in rows]
+    plain = [{**one._asdict(), "target": one.target.words(one.unit) if one.target else None} for one in rows]
     return {"machine": told, "rows": plain, "notes": notes}

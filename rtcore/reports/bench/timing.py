@@ -15,9 +15,12 @@ class RivalFailed(Exception):
 class Target(NamedTuple):
     """What a row should reach: a ratio of at least `ratio`, or a figure of our own of at most `most`."""
 
-    words: str
     ratio: float | None = None
     most: float | None = None
+
+    def words(self, unit: str) -> str:
+        """As the table tells it."""
+        return f"≤ {self.most:g} {unit}" if self.ratio is None else f"≥ {self.ratio:.3g}"
 
 
 class Row(NamedTuple):
