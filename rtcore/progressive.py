@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 try:
@@ -67,8 +68,10 @@ class Render:
     """One request under way: its film, its scratch arrays, how far it is."""
 
     def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, threads: int, coarse: bool):
-        scene, camera, self.settings = request
+        scene, camera, self.settings = self.request = request
         self.plan = composed
+        self.finished = False   # the pass
+        self.done = False
         self.dropped = geometry.dropped
         width, height = self.settings.size
         view = camera.rays(width, height)
@@ -87,9 +90,20 @@ class Render:
         self.done_tiles = itertools.count(1)
         self.progress = 0.0
 
-    def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[bool | None]:
-        """Trace the current pass on the pool; yields None now and then while it runs and, at the end, whether it was finished. Closing
-        the iterator, or an error in a thread, ends the threads' work first."""
+    def answers(self, request: RenderRequest) -> bool:
+        """Whether what is under way is what another request wants too, at most seen differently. The very same request is answered by
+        going on with it, and once it is done, by doing it again."""
+        scene, camera, settings = request
+        mine = self.request.settings
+        if scene is not self.request.scene or camera != self.request.camera or msgspec.structs.replace(settings, view=mine.view) != mine:
+            return False
+        if VIEW[settings.view].needs_light and not VIEW[mine.view].needs_light:
+            return False        # no light was traced
+        return not self.done or settings.view != self.settings.view
+
+    def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[None]:
+        """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
+        a thread, ends the threads' work first."""
         one = self.schedule[self.number]
         queue, cost = tiles(one, *self.settings.size), weight(one, *self.settings.size)
         todo, halt = iter(queue), threading.Event()
@@ -104,18 +118,18 @@ class Render:
         try:
             while wait(shares, PARTIAL, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
                 self.elapsed = time.perf_counter() - self.prepared
-                yield None
+                yield
         finally:
             if not all(share.done() for share in shares):
                 halt.set()
             wait(shares)
             self.elapsed = time.perf_counter() - self.prepared
-        finished = [share.result() for share in shares]     # an exception of a thread comes out here
-        if all(finished):
+        results = [share.result() for share in shares]      # an exception of a thread comes out here
+        self.finished = all(results)
+        if self.finished:
             self.spent += cost
             if one.spacing == 1 and one.pixels is None:
                 self.samples = one.samples.stop
-        yield all(finished)
 
     def _work(self, scratch: Scratch, one: Pass, todo: Iterator, each: float, stale: Callable[[], bool]) -> bool:
         """One thread's share of a pass: the next tile as long as there is one; False if it became stale."""
@@ -227,30 +241,35 @@ class Renderer:
 
     def frames(self, request: RenderRequest, cancelled: Callable[[], bool] = lambda: False, coarse: bool = True) -> Iterator[Frame]:
         """The pictures of a request, coarse ones first if wanted, the last one with `done`. Once `cancelled()` is true the running pass
-        ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far."""
+        ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far. The same
+        request again goes on from there, with another view too: then the first picture comes at once and nothing is traced twice."""
         start = time.perf_counter()
         composed = self._composed(request.scene, request.settings)
         loaded = time.perf_counter()
         threads = request.settings.threads or cores()
-        geometry = self.geometry(request.scene, request.settings.precision)
-        self._render = render = Render(request, composed, geometry, threads, coarse)
+        render = self._render
+        if render is not None and render.answers(request):
+            render.settings, render.prepared = request.settings, loaded - render.elapsed
+            if render.samples or render.number:
+                yield render.frame(render.done)
+        else:
+            geometry = self.geometry(request.scene, request.settings.precision)
+            self._render = render = Render(request, composed, geometry, threads, coarse)
+            self._compile, self._prepare = loaded - start, render.prepared - loaded
         if self._pool is None or self._threads != threads:
             self.close()
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
-        self._compile, self._prepare = loaded - start, render.prepared - loaded
-        number, done = 0, False
-        while not done:
-            render.number = number
-            for finished in render.trace(self._pool, cancelled):
-                if finished is None and not cancelled():
+        while not render.done:
+            for _ in render.trace(self._pool, cancelled):
+                if not cancelled():
                     yield render.frame(False)
             if cancelled():
                 return
-            done = not (finished and render.goes_on())
-            if done:
+            render.done = not (render.finished and render.goes_on())
+            if render.done:
                 render.progress = 1.0
-            yield render.frame(done)
-            number += 1
+            yield render.frame(render.done)
+            render.number += not render.done
 
     def _composed(self, scene: Scene, settings: Settings) -> Plan:
         """The plan, made anew only for another scene or other settings, with all its kernels at hand: from the cache, or compiled."""

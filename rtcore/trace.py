@@ -106,14 +106,17 @@ class Tracer:
         self.fog = fogs.numbers(fog) if plan.fog else None
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
-        """Trace one sample of a tile (see `eye.cast`) onto the film; False if it was given up half way, the film then as before."""
+        """Trace one sample of a tile (see `eye.cast`) onto the film, unless it is there already; False if it was given up half way, the
+        film then as before."""
         wave = scratch.primary(int(tile[2] * tile[3]))
         scratch.clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
-        return n == 0 or self._trace(scratch, film, wave, n, sample == 0, stale)
+        return n == 0 or film.count[scratch.target[0]] > sample or self._trace(scratch, film, wave, n, sample == 0, stale)
 
     def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
         """The same for further samples of a list of pixels (see `eye.cast_list`)."""
+        if film.count[pixels[0, 0]] > pixels[0, 1]:
+            return True
         wave = scratch.primary(int((pixels[:, 2] - pixels[:, 1]).sum()))
         scratch.clock.start()
         n = cast_list(wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)

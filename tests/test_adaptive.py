@@ -1,4 +1,6 @@
 """Adaptive sampling: samples go where the error is, the estimate stays fair, and the picture is the same for any number of threads."""
+import threading
+
 import numpy as np
 import pytest
 
@@ -182,3 +184,56 @@ def test_equal_pixels_share_what_there_is_evenly():
     assert weight(one, 50, 40) == 4 and (one.pixels[:, 2] == 16).all()
     columns = np.bincount(one.pixels[:, 0] % 50, minlength=50)
     assert columns.min() >= 15 and columns.max() <= 25
+
+
+# --- going on ---
+
+@pytest.mark.parametrize("adaptive", [True, False])
+def test_another_view_traces_nothing_and_goes_on(adaptive):
+    renderer, chosen = Renderer(), {"size": SIZE, "samples": 16, "adaptive": adaptive, "threads": 2}
+
+    def request(view):
+        return RenderRequest(BALLS, BALLS.camera, Settings(view=view, **chosen))
+    halfway = threading.Event()
+    seen = [frame for frame in renderer.frames(request("beauty"), halfway.is_set) if frame.samples < 4 or halfway.set() is None]
+    first, *rest = renderer.frames(request("normal"), lambda: True)
+    assert not seen[-1].done and not rest and first.rays == seen[-1].rays and (first.pixels != seen[-1].pixels).any()
+    *_, last = renderer.frames(request("beauty"))
+    whole = rtcore.render(BALLS, SIZE, 16, adaptive=adaptive)
+    assert last.done and last.pixels.tobytes() == whole.pixels.tobytes() and last.rays == whole.stats["rays"]
+    (depth,) = renderer.frames(request("depth"))
+    assert depth.done and depth.rays == last.rays and depth.number == last.number
+    (beauty,) = renderer.frames(request("beauty"))
+    assert beauty.pixels.tobytes() == last.pixels.tobytes()
+    again = list(renderer.frames(request("beauty")))       # asked for the same once it is done, it is done again
+    assert len(again) > 1 and again[-1].rays == last.rays
+    renderer.close()
+
+
+def test_a_view_without_light_has_none_to_go_on_with():
+    renderer, chosen = Renderer(), {"size": SIZE, "samples": 2}
+    list(renderer.frames(RenderRequest(BALLS, BALLS.camera, Settings(view="normal", **chosen))))
+    *_, last = renderer.frames(RenderRequest(BALLS, BALLS.camera, Settings(**chosen)))
+    renderer.close()
+    assert last.pixels.tobytes() == rtcore.render(BALLS, SIZE, 2).pixels.tobytes()
+
+
+def test_a_stopped_render_goes_on_wherever_it_was_stopped():
+    renderer, settings = Renderer(), Settings(size=(300, 200), samples=12, adaptive=True, threads=2)
+    request, last, stops = RenderRequest(BALLS, BALLS.camera, settings), None, 0
+
+    def patience(calls):
+        """Whether it was asked so many times before; once so, for ever."""
+        left = [calls]
+
+        def tired():
+            left[0] -= 1
+            return left[0] < 0
+        return tired
+    while last is None or not last.done:
+        for frame in renderer.frames(request, patience(17 + 9 * stops)):
+            last = frame
+        stops += 1
+    renderer.close()
+    whole = rtcore.render(BALLS, (300, 200), 12, adaptive=True)
+    assert stops > 10 and last.pixels.tobytes() == whole.pixels.tobytes() and last.rays == whole.stats["rays"]
