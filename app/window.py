@@ -92,9 +92,10 @@ class Window(QMainWindow):
 
     def arrange(self):
         """The built-in arrangement: the tree left; right the rest in tabs, on a tall screen the properties below them; what belongs to the
-        bottom is hidden until it is asked for."""
+        bottom is in tabs there, and hidden until it is asked for."""
         height = self.screen().availableGeometry().height()
         right: list[QDockWidget] = []
+        bottom: list[QDockWidget] = []
         for panel in PANELS:
             dock = self.docks[panel.title]
             self.removeDockWidget(dock)
@@ -103,6 +104,10 @@ class Window(QMainWindow):
             dock.setVisible(panel.area != "bottom")
             if panel.area == "right":
                 right.append(dock)
+            elif panel.area == "bottom":
+                bottom.append(dock)
+        for dock in bottom[1:]:
+            self.tabifyDockWidget(bottom[0], dock)
         last = self.docks["Properties"]
         tabs = [dock for dock in right if dock is not last or height < TALL]
         for dock in tabs[1:]:

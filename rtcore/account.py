@@ -9,7 +9,7 @@ from typing import NamedTuple
 from numba.core.dispatcher import Dispatcher
 
 from rtcore.jit import Cache
-from rtcore.plan import GLOW, Plan
+from rtcore.plan import Plan
 from rtcore.shapes import KINDS
 
 #: Kinds as one speaks of several of them.
@@ -17,7 +17,7 @@ PLURALS = {"box": "boxes", "cone": "cones and cylinders", "torus": "tori", "poly
            "open-quadric": "open quadrics", "implicit": "formulas"}
 #: Stages as the end of "it spends a tenth of its time on ...".
 WORDS = {"primary rays": "casting the eye's rays", "surface at the hits": "points and normals where they hit",
-         GLOW: "background and ambient light", "reflected and refracted rays": "sending reflected and refracted rays on",
+         "reflected and refracted rays": "sending reflected and refracted rays on",
          "film": "adding up the samples"}
 TOLD = 3        # stages that a sentence names
 
@@ -58,7 +58,7 @@ def account(plan: Plan, seconds: Mapping[tuple[str, str], float], held: Mapping[
 def _within(stage: str) -> str:
     if stage.startswith("tree: "):
         return stage.replace("tree", "hits")
-    return {"smooth normals": "surface at the hits", "patterns": f"{GLOW}, lights", "further samples": "all stages"}.get(stage, "")
+    return {"smooth normals": "surface at the hits", "patterns": "ambient and other light", "further samples": "all stages"}.get(stage, "")
 
 
 def plural(kind: str) -> str:
@@ -77,8 +77,7 @@ def sentences(account: Account) -> list[str]:
     present = [kept.stage.removeprefix("hits: ") for kept in account.kept if kept.stage.startswith("hits: ")]
     absent = len(KINDS) - len(present)
     shapes = _series([plural(kind) for kind in present]) if present else "no shapes"
-    result.append(f"It shows {shapes}; the kernels of {'the other' if present else 'all'} {absent} kinds of shapes are neither compiled "
-                  "nor loaded.")
+    result.append(f"It shows {shapes} and needs no kernel of the {absent} {'other ' if present else ''}kinds of shapes.")
     reasons = dict(account.left_out)
     bare = [f"{plural(kind)} ({reasons[f'tree: {kind}']})" for kind in present if f"tree: {kind}" in reasons]
     if bare:

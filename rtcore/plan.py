@@ -12,7 +12,7 @@ from rtcore.views import VIEWS
 
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
-GLOW = "background, glow and ambient light"
+GLOW = "background and ambient light"
 
 
 class Plan(NamedTuple):

@@ -41,7 +41,7 @@ def test_shares_add_up_and_every_stage_and_kernel_has_one():
 def test_before_anything_is_traced_there_is_no_share():
     made = account(plan(SPHERES, Settings()), {}, {})
     assert {kept.share for kept in made.kept} == {0} and made.bytes == 0
-    assert sentences(made)[0].startswith("It shows spheres;")
+    assert sentences(made)[0].startswith("It shows spheres and")
 
 
 def test_sentences():
@@ -50,8 +50,7 @@ def test_sentences():
                ("light: point", "light-point"): 0.8, ("light: point", "lit"): 1.0, ("film", "core"): 0.8}
     assert sentences(account(plan(scene, Settings(samples=2)), seconds, {})) == [
         "This picture spends 38 % of its time on finding where rays meet spheres, 24 % on shadow rays and 18 % on point light.",
-        f"It shows cones and cylinders, planes and spheres; the kernels of the other {len(KINDS) - 3} kinds of shapes are neither compiled "
-        "nor loaded.",
+        f"It shows cones and cylinders, planes and spheres and needs no kernel of the {len(KINDS) - 3} other kinds of shapes.",
         "No tree is built for cones and cylinders (only 1: each is tested), planes (they are unbounded) and spheres (only 1: each is "
         "tested).",
         "Smooth normals are left out: no mesh brings normals.",
@@ -59,7 +58,7 @@ def test_sentences():
         "Fog is left out: the scene has none.",
         "Reflected and refracted rays are left out: no visible material reflects or transmits."]
     dark = sentences(account(plan(Scene(lights=[]), Settings()), {}, {}))
-    assert dark[0].startswith(f"It shows no shapes; the kernels of all {len(KINDS)} kinds")
+    assert dark[0].startswith(f"It shows no shapes and needs no kernel of the {len(KINDS)} kinds")
     assert "Lights are left out: none shines from a place or direction." in dark
     first_hits = sentences(account(plan(scene, Settings(view="depth")), {}, {}))
     assert f"{GLOW.capitalize()} are left out: the view shows first hits only." in first_hits

