@@ -57,7 +57,8 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         group = old.get(kind)
         if group is None or not _same(group.key, key):
             group = _gather(kind, key, [(index, packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
-        groups.append(group._replace(first=first))
+        if len(group.owner):        # all of it may be degenerate
+            groups.append(group._replace(first=first))
         owners.append(group.owner)
         first += len(group.owner)
         dropped += group.dropped

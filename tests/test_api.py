@@ -202,3 +202,10 @@ def test_load_gives_a_scene_to_render(tmp_path):
 
 def test_records_are_exported():
     assert all(hasattr(rtcore, name) for name in rtcore.__all__)
+
+
+def test_a_mesh_without_any_area_is_nothing():
+    line = Mesh([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)])
+    scene = Scene(objects=[line, Sphere((0, 0, 5), 1)])
+    assert rtcore.intersect(scene, [(0, 0, -5), (2, 0, -5)], [(0, 0, 1), (0, 0, 1)]).node.tolist() == [1, -1]
+    assert {"stage": "degenerate triangles", "why": "1 without area"} in rtcore.render(scene, (8, 6)).stats["left_out"]
