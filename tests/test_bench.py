@@ -1,6 +1,8 @@
 """`rayscope bench`: the scenes it makes, the same scene for POV-Ray, rows and ratios, the command."""
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 
@@ -201,3 +203,17 @@ def test_a_render_that_fails_ends_the_work_with_its_reason(tmp_path):
     bench = jobs.Bench((), [sys.executable, "-c", "raise SystemExit('no memory')"], tmp_path, quick=True)
     with pytest.raises(jobs.WorkFailed, match="no memory"):
         list(jobs.picture(bench, "ball", ball_in(tmp_path), False))
+
+
+def test_interrupted_it_tells_what_it_has(capsys, tmp_path, monkeypatch):
+    def run(*_):
+        yield report.Step(0.0, "balls", [], [])
+        os.kill(os.getpid(), signal.SIGINT)
+        yield report.Step(0.5, "tree", [timing.row("balls", "s", [1.0], [2.0], "POV-Ray")], ["a remark"])
+        raise AssertionError("nothing more is measured")
+
+    monkeypatch.setattr(report, "run", run)
+    code, out, err = run_here(capsys, ["bench", "-o", tmp_path / "bench.json"])
+    assert code == 130 and "POV-Ray" in out
+    assert err == "rayscope: a remark\nrayscope: interrupted; the table holds what was measured so far\n"
+    assert [row["ratio"] for row in json.loads((tmp_path / "bench.json").read_text())["rows"]] == [2.0]

@@ -38,8 +38,9 @@ def run(args, parser: Parser) -> int:
     from app.gallery import GALLERY
     ours = sorted((resources.ROOT / "meshes").glob("*.ply"))
     machine, step = report.machine(against), None
+    command = [sys.executable, "-P", "-m", "app"]       # -P: not what happens to be called app in this folder
     with interruptible() as interrupted, Progress("measuring") as bar:
-        steps = report.run(args.scenes, against, [sys.executable, "-m", "app"], sorted(GALLERY.glob("*.yaml")), ours, args.quick)
+        steps = report.run(args.scenes, against, command, sorted(GALLERY.glob("*.yaml")), ours, args.quick)
         try:
             for step in steps:
                 bar.show(step.share, step.what)
@@ -59,7 +60,10 @@ def run(args, parser: Parser) -> int:
         say(note)
     if args.output is not None:
         write_json(args.output, report.as_data(step.rows, step.notes, machine))
-    return 130 if interrupted() else 0
+    if interrupted():
+        say("interrupted; the table holds what was measured so far")
+        return 130
+    return 0
 
 
 def _show(rows, machine: dict) -> None:

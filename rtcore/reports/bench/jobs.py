@@ -219,7 +219,7 @@ def start(bench: Bench) -> Iterator[Row]:
     path = bench.folder / "small.nff"
     path.write_text(databases.sphereflake(2))
     picture = "render", path, "-o", bench.folder / "small.png", "--size", "320x240"
-    bare = [sys.executable, "-c", "import numpy, numba"]
+    bare = [sys.executable, "-P", "-c", "import numpy, numba"]
     found = bench.measure("start-up", {
         OURS: lambda: seconds_of(lambda: bench.run(*picture)),
         "bare": lambda: seconds_of(lambda: subprocess.run(bare, check=True))})

@@ -94,8 +94,8 @@ class Helper:
 
     def __init__(self, module: str, *words: object):
         self._errors = tempfile.TemporaryFile("w+", errors="replace")  # noqa: SIM115 -- closed by `close`
-        self._process = subprocess.Popen([sys.executable, "-m", module, *map(str, words)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                                         stderr=self._errors, text=True, env=environment())
+        self._process = subprocess.Popen([sys.executable, "-P", "-m", module, *map(str, words)], stdin=subprocess.PIPE,
+                                         stdout=subprocess.PIPE, stderr=self._errors, text=True, env=environment())
 
     def ask(self, line: str) -> float:
         """What it answers; RivalFailed, with the last thing it said, if it has ended."""
