@@ -2,6 +2,7 @@
 from typing import Annotated
 
 from rtcore.fields import Choice, FieldError, Flag, Number, Record
+from rtcore.settings import VIEW_NAMES
 
 
 class Options(Record, frozen=True, kw_only=True):
@@ -10,6 +11,8 @@ class Options(Record, frozen=True, kw_only=True):
     shadows: Annotated[bool, Flag(help="let things stand in one another's light")] = True
     fog: Annotated[bool, Flag(help="show the scene's fog")] = True
     reflections: Annotated[bool, Flag(help="follow mirrored and refracted light")] = True
+    view: Annotated[str, Choice(words=VIEW_NAMES, help="what is shown of the picture; a switch traces nothing")] = "beauty"
+    adaptive: Annotated[bool, Flag(help="put the samples where the error is: the number of samples is then their mean")] = True
     samples: Annotated[int, Number(least=1, most=65536, help="rays through each pixel once the picture is finished")] = 16
     scale: Annotated[float, Number(least=0.1, most=2, help="resolution of the picture against that of the screen")] = 1.0
     max_depth: Annotated[int, Number(least=1, most=64, help="longest chain of rays, the eye's included")] = 5
@@ -25,5 +28,6 @@ class Options(Record, frozen=True, kw_only=True):
 
     def settings(self) -> dict:
         """The keyword arguments of `rtcore.progressive.Settings`, but for the size."""
-        return {"shadows": self.shadows, "fog": self.fog, "reflections": self.reflections, "samples": int(self.samples),
+        return {"shadows": self.shadows, "fog": self.fog, "reflections": self.reflections, "view": self.view,
+                "adaptive": self.adaptive, "samples": int(self.samples),
                 "max_depth": int(self.max_depth), "threads": int(self.threads), "precision": self.precision, "seed": int(self.seed)}

@@ -4,21 +4,33 @@ import math
 from PySide6.QtCore import Qt, Slot
 from PySide6.QtWidgets import QLabel, QSizePolicy, QStatusBar, QWidget
 
+from app.forecast import Forecast, left_text
 from app.session import Session
 
 TRACED = ("primary", "shadow", "reflection", "refraction")
-PARTS = (("pass", "samples 65536/65536", "How far the picture is: the lattice that is traced, then the rays through each pixel"),
+PARTS = (("pass", "converged, samples 65536/65536", "How far it is: the lattice that is traced, then samples per pixel, their mean"),
          ("speed", "9,999.9 Mrays/s", "Rays traced in a second, in millions: primary, shadow, reflected and refracted ones"),
          ("elapsed", "99:59:59.9", "How long this picture has been traced"),
+         ("error", "error 0.000012", "Estimated root mean square error, in linear light where white is 1; blind to what no sample met"),
+         ("left", "100 to 100 min left", "Time until all samples are traced, from the fastest and the slowest of the latest paces"),
          ("pixel", "99999, 99999", "The pixel under the cursor, counted from the top left"),
          ("distance", "at 1.23456e+10", "How far from the eye that is which the cursor points at, in scene units"))
 
 
-def pass_text(frame) -> str:
-    """How far a frame is."""
+def pass_text(frame, samples: int) -> str:
+    """How far a frame is on the way to so many samples per pixel."""
     if frame.spacing > 1:
         return f"1/{frame.spacing} lattice"
-    return f"{'done, ' if frame.done else ''}samples {frame.samples}"
+    if frame.converged:
+        return f"converged, samples {frame.mean:.4g}"
+    return f"{'done, ' if frame.done else ''}samples {frame.mean:.4g}/{samples}"
+
+
+def error_text(error: float | None) -> str:
+    """The estimated error, to two digits."""
+    if error is None:
+        return ""
+    return f"error {error:.2g}" if error == 0 or error >= 1e-4 else f"error {error:.1e}"
 
 
 def speed_text(frame) -> str:
@@ -51,7 +63,8 @@ class Status(QStatusBar):
         self.under.setContentsMargins(8, 0, 0, 0)
         self.addWidget(self.under, 1)
         self.parts: dict[str, QLabel] = {}
-        for name, widest, tip in (PARTS[3], PARTS[4], *PARTS[:3]):
+        self._forecast = Forecast()
+        for name, widest, tip in (*PARTS[-2:], *PARTS[:-2]):
             label = QLabel()
             label.setToolTip(tip)
             label.setAccessibleName(name.capitalize())
@@ -66,10 +79,13 @@ class Status(QStatusBar):
     @Slot()
     def _frame(self):
         shown = self._session.shown
-        text = pass_text(shown.frame)
-        self.parts["pass"].setText(text if shown.frame.spacing > 1 else f"{text}/{int(shown.job.options.samples)}")
-        self.parts["speed"].setText(speed_text(shown.frame))
-        self.parts["elapsed"].setText(elapsed_text(shown.frame.elapsed))
+        frame, samples = shown.frame, int(shown.job.options.samples)
+        self._forecast.note(frame.elapsed, frame.mean)
+        self.parts["pass"].setText(pass_text(frame, samples))
+        self.parts["speed"].setText(speed_text(frame))
+        self.parts["elapsed"].setText(elapsed_text(frame.elapsed))
+        self.parts["error"].setText(error_text(frame.error))
+        self.parts["left"].setText("" if frame.done else left_text(self._forecast.left(samples)))
 
     @Slot()
     def _hover(self):

@@ -27,6 +27,9 @@ class Frame(NamedTuple):
     plan: Plan
     seconds: dict
     held: dict
+    mean: float = 1.0
+    error: float | None = None
+    converged: bool = False
 
 
 class Double:

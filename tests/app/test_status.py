@@ -1,0 +1,55 @@
+"""The status bar's texts, and how long a picture will take yet."""
+import pytest
+
+from app.forecast import Forecast, left_text
+from app.options import Options
+from app.status import PARTS, error_text, pass_text
+
+
+def test_the_bar_tells_samples_error_and_time_left(window, session, double, settled, qtbot):
+    parts = window.statusBar().parts
+    assert set(parts) == {name for name, *_ in PARTS} and all(part.toolTip() and part.accessibleName() for part in parts.values())
+    settled(session)
+    frame = session.shown.frame
+    for changes, word, error, left in (
+            ({"mean": 0.0, "elapsed": 0.0, "error": None, "done": False}, "samples 0/16", "", ""),
+            ({"mean": 4.0, "elapsed": 1.0, "error": None, "done": False}, "samples 4/16", "", "3 s left"),
+            ({"mean": 8.0, "elapsed": 2.0, "error": 0.0123, "done": False}, "samples 8/16", "error 0.012", "2.0 s left"),
+            ({"mean": 10.0, "elapsed": 3.0, "error": 2.5e-5, "done": False}, "samples 10/16", "error 2.5e-05", "2 to 3 s left"),
+            ({"mean": 16.0, "elapsed": 5.0, "error": 1e-3, "done": True}, "done, samples 16/16", "error 0.001", ""),
+            ({"mean": 9.5, "elapsed": 6.0, "error": 0.0, "done": True, "converged": True}, "converged, samples 9.5", "error 0", "")):
+        session.shown = session.shown._replace(frame=frame._replace(spacing=1, **changes))
+        session.frame_changed.emit()
+        assert (parts["pass"].text(), parts["error"].text(), parts["left"].text()) == (word, error, left)
+        for name in ("pass", "error", "left"):
+            assert parts[name].fontMetrics().horizontalAdvance(parts[name].text()) <= parts[name].width()
+
+
+def test_texts():
+    assert error_text(None) == "" and error_text(0.5) == "error 0.5" and error_text(1.234e-6) == "error 1.2e-06"
+    assert left_text(None) == "" and left_text((8.2, 12.4)) == "8 to 12 s left" and left_text((61.0, 400.0)) == "1 to 7 min left"
+    assert left_text((0.52, 0.54)) == "0.5 s left" and left_text((7000.0, 7100.0)) == "1.9 to 2.0 h left"
+
+
+def test_only_a_converged_picture_is_called_so(session, settled):
+    settled(session)
+    frame = session.shown.frame._replace(spacing=1, mean=8.0)
+    assert pass_text(frame._replace(done=True, converged=True), 16).startswith("converged")
+    assert not pass_text(frame._replace(done=True), 8).startswith("converged") and pass_text(frame._replace(spacing=4), 8) == "1/4 lattice"
+
+
+def test_the_forecast_is_an_interval_of_paces():
+    forecast = Forecast()
+    assert forecast.left(16) is None
+    for seconds, samples in ((1.0, 4.0), (2.0, 8.0), (4.0, 10.0)):      # 4 a second, then 1
+        forecast.note(seconds, samples)
+    assert forecast.left(16) == pytest.approx((1.5, 6.0)) and forecast.left(5) == (0, 0)
+    forecast.note(0.1, 1.0)     # another picture
+    assert forecast.left(16) is None
+    forecast.note(0.11, 2.0)    # too soon to tell
+    assert forecast.left(16) is None
+
+
+def test_what_the_window_asks_for():
+    settings = Options(view="error", samples=32).settings()
+    assert settings["adaptive"] and settings["view"] == "error" and settings["samples"] == 32
