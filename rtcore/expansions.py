@@ -9,7 +9,8 @@ from rtcore.jit import inline, kernel, out_of_line
 from rtcore.pairs import divide, square_root, two_product, two_sum
 
 LONG = 4        # parts of an expansion
-NOISE = 2.0 ** -150     # what sums may be off, over their terms, if the factors are three floats long; below it they are 0
+#: What sums may be off, over their terms, if the factors are three floats long, or are exact; below it they are 0.
+NOISE, EXACT_NOISE = 2.0 ** -150, 2.0 ** -190
 
 
 @kernel
@@ -52,22 +53,22 @@ def clear(sum_, noise):
 
 
 @kernel
-def noise_of(f, d, far, speed, curved, steep, rest):
-    """What is noise in a, b, c and the discriminant of a form of second degree along f + s d, expansions (3, LONG) off by roundings of
-    `far` and `speed`. curved, steep, rest: the largest numbers of the form's parts of second, first and no degree."""
+def noise_of(f, d, far, speed, curved, steep, rest, noise):
+    """What is noise in a, b, c and the discriminant of a form of second degree along f + s d, expansions (3, LONG) off by `noise`, NOISE or
+    EXACT_NOISE, times `far` and `speed`. curved, steep, rest: the largest numbers of the form's parts of second, first and no degree."""
     out_of_line()
     size = np.sqrt(f[0, 0] ** 2 + f[1, 0] ** 2 + f[2, 0] ** 2)
     pace = np.sqrt(d[0, 0] ** 2 + d[1, 0] ** 2 + d[2, 0] ** 2)
     shift = -(f[0, 0] * d[0, 0] + f[1, 0] * d[1, 0] + f[2, 0] * d[2, 0]) / pace ** 2
-    off_a = NOISE * curved * pace * speed
-    off_b = NOISE * ((curved * size + steep) * speed + curved * pace * far)
-    off_c = NOISE * ((curved * size + steep) * far + rest)
+    off_a = noise * curved * pace * speed
+    off_b = noise * ((curved * size + steep) * speed + curved * pace * far)
+    off_c = noise * ((curved * size + steep) * far + rest)
     # the discriminant is the same about the closest approach, where all is smaller
     size = np.sqrt((f[0, 0] + shift * d[0, 0]) ** 2 + (f[1, 0] + shift * d[1, 0]) ** 2 + (f[2, 0] + shift * d[2, 0]) ** 2)
     far += abs(shift) * speed
     slope = curved * size + steep
-    off = 2 * slope * pace * NOISE * (slope * speed + curved * pace * far)
-    off += curved * pace ** 2 * NOISE * (slope * far + rest) + (slope * size + rest) * off_a
+    off = 2 * slope * pace * noise * (slope * speed + curved * pace * far)
+    off += curved * pace ** 2 * noise * (slope * far + rest) + (slope * size + rest) * off_a
     return off_a, off_b, off_c, off
 
 

@@ -25,7 +25,7 @@ class Film(NamedTuple):
     node: np.ndarray        # int32 (h·w): the leaf that sample 0 hit first, -1 none
     distance: np.ndarray    # float32 (h·w): how far away, inf none
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
-    doubt: np.ndarray       # uint8 (h·w): 1 where that hit has no proof
+    doubt: np.ndarray       # uint8 (h·w): not 0 where that hit, or that there is none nearer, has no proof
 
 
 def new_film(width: int, height: int, samples: int = 2) -> Film:
@@ -49,10 +49,11 @@ def note_first_hits(film, wave, n, target, leaf):
 
 @kernel
 def note_doubt(film, wave, n, target, first, last):
-    """Which primary rays hit one of the primitives first .. last - 1, of a kind that can be in doubt, without a proof."""
+    """Which primary rays hit one of the primitives first .. last - 1, of a kind that can be in doubt, without a proof, or were given up
+    by one, bit 1 of their doubt, whatever they hit."""
     for i in range(n):
-        if first <= wave.rays.prim[i] < last:
-            film.doubt[target[i]] = wave.rays.doubt[i]
+        hit = first <= wave.rays.prim[i] < last
+        film.doubt[target[i]] = wave.rays.doubt[i] if hit else wave.rays.doubt[i] & 2
 
 
 @kernel

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 import rtcore
 from rtcore import Matrix, Node, Scene
 
-from test_shapes import EXAMPLES
+from test_shapes import EXAMPLES, rays_at, transform
 
 DTYPE = {"f64": np.float64, "f32": np.float32}
 #: Where t is the true one to half an ulp, so that it can't depend on the axes' order by more than one.
 CERTAIN = {"sphere", "plane", "polygon", "box", "cylinder", "tube", "cone", "frustum", "funnel", "saddle", "hyperboloid", "torus",
-           "spindle"}
+           "spindle", "gem", "wedge"}
 
 number = st.floats(-3, 3, width=32)
 ray = st.tuples(number, number, number, number, number, number).filter(lambda r: max(map(abs, r[3:])) > 1e-3)
@@ -78,3 +78,22 @@ class TestCompanions:
             assert not rtcore.occluded(scene, o[met], d[met], t_max=t[met].astype(float), precision=precision).any()
             beyond = np.nextafter(t[met], np.inf, dtype=t.dtype).astype(float)
             assert rtcore.occluded(scene, o[met], d[met], t_max=beyond, precision=precision).all()
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+@pytest.mark.parametrize("name", sorted(CERTAIN))
+def test_past_a_crossing_comes_the_next_one(name, precision):
+    """Hits count from t_min on, which is open: also where a crossing and t_min are the same number only once t is rounded."""
+    rng, seen = np.random.default_rng([len(name), len(precision)]), 0
+    for kind in ("rigid", "stretched", "mirrored"):
+        matrix = transform(rng, kind)
+        scene = Scene(objects=[Node(shape=EXAMPLES[name], transform=[Matrix(matrix.tolist())])])
+        for o, d in zip(*rays_at(rng, matrix, 40, precision)):
+            true = rtcore.crossings(scene, o, d, precision)
+            true = true[true > 0]
+            for start in true:
+                first = rtcore.intersect(scene, [o], [d], t_min=float(start), precision=precision).t[0]
+                after = true[true > start]
+                assert first == pytest.approx(after[0] if len(after) else np.inf, rel=1e-6), (matrix.tolist(), o.tolist(), d.tolist())
+                seen += len(after)
+    assert seen > 10 or name in ("plane", "polygon")

@@ -12,6 +12,7 @@ from rtcore.settings import Settings
 from rtcore.shapes.implicit import line_roots
 from rtcore.trace import CLOSEST
 from rtcore.views.certified import draw
+from rtcore.views.view import Seen
 from rtcore.wave import GX, UNCERTIFIED
 
 from test_leaving import TRANSFORMS, first_hits, rays_of, spawn, trace
@@ -147,8 +148,22 @@ def test_what_is_not_certified_is_marked_counted_and_shown():
         renderer.close()
         orange = frame.pixels[:, :, 0] > 2 * frame.pixels[:, :, 2] + 0.1
         assert (orange == (frame.node >= 0)).all() if doubtful else not orange.any()
-    flags = np.array([[1, 1]], np.uint8)
-    assert draw(np.zeros((1, 2, 3), np.float32), np.array([[0, -1]]), None, None, flags)[0, :, 0].tolist() == pytest.approx([0.7, 0])
+    flags = np.array([[1, 2, 0]], np.uint8)
+    shown = draw(Seen(np.zeros((1, 3, 3), np.float32), np.array([[0, -1, 0]]), None, None, flags, None, None))
+    assert shown[0, :, 0].tolist() == pytest.approx([0.7, 0.7, 0])
+
+
+def test_a_ray_that_was_given_up_is_shown_whatever_it_meets():
+    """A formula that no search gets through within its pieces, before a wall: who looks at the wall sees that something may be missing."""
+    tangle = Implicit("1e-3*sin(1e6*z) + 1e-3*sin(1e7*x) + 1.9e-3", *BOX)
+    camera = rtcore.Camera(lookfrom=(0.3, 0.2, 6), lookat=(0, 0, 0), fov=30)
+    for behind in ((), (rtcore.Plane((0, 0, -3), (0, 0, 1)),)):
+        renderer = Renderer()
+        request = RenderRequest(Scene(objects=[tangle, *behind]), camera, Settings(size=(16, 12), view="certified"))
+        *_, frame = renderer.frames(request, coarse=False)
+        shown = frame.pixels[:, :, 0] > 2 * frame.pixels[:, :, 2] + 0.1
+        assert renderer.stats()["uncertified"] > 0 and (shown & (frame.node != 0)).any()
+        renderer.close()
 
 
 @pytest.mark.parametrize("text", ["1/(x - x + y*1e-300)", "sin(1e9*x)*sin(1e9*y)", "(x - 1)^20 - 1e-30", "log(x - 5)", "exp(exp(exp(9*x)))",

@@ -119,7 +119,7 @@ def test_every_shape_has_what_the_report_needs():
 def test_the_targets_of_quadratics_and_the_torus():
     assert TARGETS[Sphere].words("f64", "far") == "2 ulp, 0 wrong" and TARGETS[Sphere].words("f32", "far") == "1 ulp, 0 wrong"
     assert TARGETS[Torus].words("f64", "far") == "4 ulp or 4 cond u, 0 wrong"
-    assert TARGETS[Box].words("f64", "edges") == "2 ulp or 4 cond u" != TARGETS[Box].words("f64", "plain")
+    assert TARGETS[Mesh].words("f64", "edges") == "2 ulp or 4 cond u" != TARGETS[Mesh].words("f64", "plain")
 
 
 def test_the_textbook_is_shown_as_it_is():

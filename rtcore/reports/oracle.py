@@ -21,6 +21,7 @@ except ModuleNotFoundError:
 
 mp = mpmath.MPContext()
 mp.dps = 50
+NOTHING = mp.mpf(10) ** -44     # of the size of its terms: a sum that is 0 but for the last digits; no float64 numbers leave so little
 
 
 class Crossing(NamedTuple):
@@ -71,6 +72,8 @@ def quadratic(a, b, c) -> list:
     if c == 0:      # exactly, not but for a root's last digit
         return sorted([mp.mpf(0), -2 * b / a])
     square = b * b - a * c
+    if abs(square) <= NOTHING * (b * b + abs(a * c)):
+        square = mp.mpf(0)
     return [] if square < 0 else [(-b - mp.sqrt(square)) / a, (-b + mp.sqrt(square)) / a]
 
 
@@ -193,7 +196,7 @@ def _round(base, base_radius, apex, apex_radius, capped, o, d):
     c = dot(f, f) - fh * fh - (r0 + k * fh) ** 2
     for t in quadratic(a, b, c):
         height = fh + t * dh
-        if 0 <= height <= length:
+        if -NOTHING * length <= height <= (1 + NOTHING) * length:       # the apex and the rims belong to it
             radial = sub(add(f, times(t, d)), times(height, w))
             radius = r0 + k * height
             if radius > 0:

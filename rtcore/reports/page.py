@@ -20,10 +20,14 @@ ABOUT = """\
 - "k cond u" allows k times the root's condition number times u = 2⁻⁵³ (2⁻²⁴ in float32). The condition is the sum of |x ∂t/∂x| / |t| over
   all numbers x of the ray and the shape. It is infinite at a tangent.
 - *edges* aims at edges and vertices, or off them by down to one rounding. There, in *grazing* and on the *surface*, a wrong answer of a
-  flat shape is counted, but is no missed target; a ray lost between two triangles (*shared edges*) is.
+  triangle is counted, but is no missed target; a ray lost between two of them (*shared edges*) is.
 - The families without errors need no oracle: *any-hit* compares `occluded` with `intersect`, *leaving* sends rays from hit points as the
   shading does, *gap* puts a plane 64 ulp above the surface, *shared edges* aims at the edges of closed meshes.
 """
+
+
+#: The plots that `rayscope stability` draws beside the page, of each shape: as named in `stability-SHAPE-PLOT.png`.
+PLOTS = ("work-precision", "distance", "scale")
 
 
 def page(rows: list[Row], misses: list[str], note: str = "") -> str:
@@ -31,7 +35,8 @@ def page(rows: list[Row], misses: list[str], note: str = "") -> str:
     judged = [row for row in rows if row.met is not None]
     parts = ["# Numerical stability\n", _verdict(judged, misses), note and note + "\n", _examples(judged), _solvers(rows)]
     for shape, group in groupby(rows, key=lambda row: row.shape):
-        parts.append(f"## {shape.capitalize()}\n\n" + _table(list(group)))
+        links = " ".join(f"![{shape}: {plot}](stability-{shape}-{plot}.png)" for plot in PLOTS)
+        parts.append(f"## {shape.capitalize()}\n\n{links}\n\n" + _table(list(group)))
     return "\n".join(filter(None, (*parts, ABOUT)))
 
 

@@ -28,10 +28,11 @@ class Target(NamedTuple):
 
 
 QUADRATIC = Target({"f32": 1, "f64": 2})
-#: Flat shapes: t is bounded through the condition; at their edges what counts is that no ray is lost between two of them.
-FLAT = Target({"f32": 1, "f64": 2}, 4, exact_hits=False)
+#: Flat shapes: t is bounded through the condition. At the edges of triangles what counts is that no ray is lost between two of them.
+FLAT = Target({"f32": 1, "f64": 2}, 4)
+TRIANGLES = FLAT._replace(exact_hits=False)
 
 TARGETS: dict[type[Shape], Target] = {
     Sphere: QUADRATIC, Plane: QUADRATIC, Quadric: QUADRATIC, Cylinder: QUADRATIC, Cone: QUADRATIC,
     Torus: Target({"f32": 4, "f64": 4}, 4), Blob: Target({"f32": 1, "f64": 2}, 8), Implicit: Target({"f32": 1, "f64": 2}, 8),
-    Triangle: FLAT, Mesh: FLAT, Polygon: FLAT, Box: FLAT, Polyhedron: FLAT}
+    Triangle: TRIANGLES, Mesh: TRIANGLES, Polygon: FLAT, Box: FLAT, Polyhedron: FLAT}

@@ -8,7 +8,7 @@ import numpy as np
 
 from rtcore.expansions import LONG, expand, put_products, solve_quadratic
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import along, any_lane, dot, fma, root, select, size, with_sign
+from rtcore.lanes import along, any_lane, dot, fma, root, rounded, select, size, wide, with_sign
 from rtcore.pairs import ordered_sum, square, two_product, two_sum
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import SLOW, START, record_one
@@ -72,9 +72,9 @@ def polish(f, f1, v, v1, s, radius, radius1, far, speed):
 
 
 @inline
-def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, side):
+def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, side, like):
     """Where the lanes `todo` first cross a ball between start and end; `near` is what `closest` gave. Returns s, the lanes that found
-    it, and those for which this arithmetic isn't certain.
+    it, and those for which this arithmetic isn't certain. What comes after the start is told once s is rounded to the type of `like`.
 
     No array may come in here: numba counts references to those that a function with branches is given, in the hottest of loops.
     """
@@ -96,7 +96,7 @@ def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, si
             s, slope, left = polish(f, f1, v, v1, enter, radius, radius1, far, speed)
             ok = certain(s, slope, left, start, end)
             unsure = unsure | (want & ~ok)
-            found = want & ok & (s > start)
+            found = want & ok & (wide(rounded(s, like)) > start)
             todo = todo & ~(want & ~ok) & ~found
     if side & FRONT == 0:
         leave = select(outer > 0, outer, inner)
@@ -108,6 +108,12 @@ def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, si
             s = select(want & ok, r, s)
             found = found | (want & ok)
     return s, found, unsure
+
+
+@inline
+def after_start(ray, i, t):
+    """Whether t, rounded to the ray's precision, is past the start of ray i."""
+    return (np.float64(np.float32(t)) if ray.itemsize == 4 else t) > ray[START, i]
 
 
 @inline
@@ -149,7 +155,7 @@ def settle_one(rays, i, p, f, d, noise, radius, radius1, power, side, opacity):
     if solve_quadratic(form[0], form[1], form[2], noise, roots) == 0 and side & (FRONT | BACK):
         return
     enter, leave = min(roots[0, 0], roots[1, 0]) * power, max(roots[0, 0], roots[1, 0]) * power
-    if side & BACK == 0 and enter > rays.ray[START, i]:
+    if side & BACK == 0 and after_start(rays.ray, i, enter):
         record_one(rays, i, p, enter, opacity)
     elif side & FRONT == 0:
         record_one(rays, i, p, leave, opacity)

@@ -15,8 +15,8 @@ from rtcore.expansions import LONG, expand, noise_of, put_products, solve_quadra
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
 from rtcore.pairs import add, multiply
-from rtcore.shapes._ball import U64, advance, certain, extent
-from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs
+from rtcore.shapes._ball import U64, advance, after_start, certain, extent
+from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs, noise_here
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import DX, OX, SLOW, START, T, record_one, until
 
@@ -153,7 +153,7 @@ def within(p, low, high, margin):
 
 
 @inline
-def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side):
+def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side, like):
     """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. part: which part of the
     form belongs to it, low and high being the box's corners, or low the slab's vector; none of it is further than `limit` from the origin.
     No array may come in here, see `_ball.choose`."""
@@ -178,7 +178,7 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end,
             r, slope, left, p = polish(m, near, f, f1, v, v1, far, guess)
             steep = size(slope)
             ok = certain(r, steep, left, start, end)
-            hit = want & ok & (r > start) & (r < end)
+            hit = want & ok & (wide(rounded(r, like)) > start) & (r < end)
             if part != EVERYWHERE:
                 margin = 8 * U64 * (limit + near.reach) + near.speed * (left / steep + 2 * U64 * size(r))
                 inside, maybe = within(p, low, high, margin)
@@ -204,7 +204,7 @@ def meet(ray, i, exact, q, most, part, limit, todo, near, side):
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     end, far = load(ray, T, i), near.far + most * extent(splat3(exact, q, PLACE))
     t, found, unsure = choose(todo, near, form_of(exact, q, 0 * f.x), f, f1, v, v1, far, splat3(exact, q, BOX), splat3(exact, q, BOX + 3),
-                              part, limit, wide(load(ray, START, i)), until(ray, i), side)
+                              part, limit, wide(load(ray, START, i)), until(ray, i), side, end)
     return rounded(t, end), found, unsure
 
 
@@ -260,7 +260,7 @@ def noise_along(exact, q, f, d, far, speed):
         curved = max(curved, abs(exact[q, FORM + k]))
     for k in range(6, 9):
         steep = max(steep, abs(exact[q, FORM + k]))
-    return noise_of(f, d, far, speed, curved, steep, abs(exact[q, FORM + 9]))
+    return noise_of(f, d, far, speed, curved, steep, abs(exact[q, FORM + 9]), noise_here(exact, q, FORM + 20, FORM + 30))
 
 
 @kernel
@@ -278,7 +278,7 @@ def settle(rays, i, p, table, q, part, opacity):
         j = first if k == 0 else 1 - first
         falls = slope < 0 if j == 0 else slope > 0
         rises = slope > 0 if j == 0 else slope < 0
-        if (side & FRONT and not falls) or (side & BACK and not rises) or not ray[START, i] < roots[j, 0]:
+        if (side & FRONT and not falls) or (side & BACK and not rises) or not after_start(ray, i, roots[j, 0]):
             continue
         if not abs(roots[j, 0]) < np.inf:
             continue

@@ -4,7 +4,7 @@ Table.exact begins with the three parts of the centre c, in which p_unit = L (p 
 """
 import numpy as np
 
-from rtcore.expansions import LONG, expand, put_products
+from rtcore.expansions import EXACT_NOISE, LONG, NOISE, expand, put_products
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import load3, splat3, vec3, wide
 from rtcore.pairs import add, multiply, two_sum
@@ -52,6 +52,20 @@ def line_in_pairs(ray, i, exact, q):
     f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, PLACE + 3))
     v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
     return f, f1, v, v1
+
+
+@inline
+def noise_here(exact, q, first, last):
+    """What sums of the numbers of primitive q may be off: its place, L, and those whose third parts are the columns first .. last - 1.
+    Less if none has a third part: then they are exact."""
+    rest = 0.0
+    for k in range(3):
+        rest = max(rest, abs(exact[q, PLACE + 6 + k]))
+    for k in range(9):
+        rest = max(rest, abs(exact[q, INTO + 18 + k]))
+    for k in range(first, last):
+        rest = max(rest, abs(exact[q, k]))
+    return NOISE if rest > 0 else EXACT_NOISE
 
 
 @kernel

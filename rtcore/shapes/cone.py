@@ -200,32 +200,34 @@ def settle_cap(rays, i, p, table, q, end, opacity):
     rays.tally[SLOW] += 1
     exact, side = table.exact, table.side[q]
     f, d, form, low, rise = np.empty((3, LONG)), np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(LONG)
-    terms, square_t = np.empty(2 * LONG * LONG + 5 * LONG + LONG), np.empty(LONG)
+    terms, square = np.empty(6 * LONG * LONG + LONG), np.empty((3, LONG))
     far, speed = line_expanded(rays.ray, i, exact, q, f, d)
     heights(exact, q, f, low)
     heights(exact, q, d, rise)
     steep = max(abs(exact[q, BOX]), max(abs(exact[q, BOX + 1]), abs(exact[q, BOX + 2])))
-    clear(rise, NOISE * steep * speed)
+    off_low, off_rise = NOISE * (steep * far + 0.5), NOISE * steep * speed
+    clear(rise, off_rise)
     if rise[0] == 0 or (side & FRONT and rise[0] * end > 0) or (side & BACK and rise[0] * end < 0):
         return
     for k in range(LONG):
         terms[k] = -low[k]
     terms[LONG] = end
     expand(terms, LONG + 1, low)
-    clear(low, NOISE * (steep * far + 0.5))
-    t = divide(low[0], low[1], rise[0], rise[1])
+    clear(low, off_low)
+    # within the rim: the form at t = low / rise, times rise², without a division
     line_form(exact, q, f, d, form)
-    n = put_products(terms, 0, 1.0, t, t)
-    expand(terms, n, square_t)
-    n = put_products(terms, 0, 1.0, form[0], square_t)
-    n = put_products(terms, n, 2.0, t, form[1])
-    for k in range(LONG):
-        terms[n + k] = form[2, k]
-    expand(terms, n + LONG, square_t)
-    noise = noise_along(exact, q, f, d, far, speed)
-    slack = (noise[0] * abs(t[0]) + 2 * noise[1]) * abs(t[0]) + noise[2]     # a line within the wall meets the rims
-    if square_t[0] <= slack + 2.0 ** -98 * (abs(form[0, 0] * t[0] * t[0]) + abs(form[1, 0] * t[0]) + abs(form[2, 0])):
-        record_one(rays, i, p, t[0], opacity)
+    expand(terms, put_products(terms, 0, 1.0, low, low), square[0])
+    expand(terms, put_products(terms, 0, 2.0, low, rise), square[1])
+    expand(terms, put_products(terms, 0, 1.0, rise, rise), square[2])
+    n = 0
+    for k in range(3):
+        n = put_products(terms, n, 1.0, form[k], square[k])
+    expand(terms, n, square[0])
+    noise, x, y = noise_along(exact, q, f, d, far, speed), abs(low[0]), abs(rise[0])
+    slack = (noise[0] * x + 2 * noise[1] * y) * x + noise[2] * y * y        # a line within the wall meets the rims
+    a, b, c = abs(form[0, 0]), abs(form[1, 0]), abs(form[2, 0])
+    if square[0, 0] <= slack + 2 * ((a * x + b * y) * off_low + (b * x + c * y) * off_rise):
+        record_one(rays, i, p, divide(low[0], low[1], rise[0], rise[1])[0], opacity)
 
 
 @kernel

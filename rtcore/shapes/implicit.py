@@ -28,6 +28,7 @@ from rtcore.wave import DX, ERR, OX, START, UNCERTIFIED, T, U, new_rays, record,
 INVERSE_REST, LOW, HIGH, COUNT, CODE = OWN, OWN + 9, OWN + 12, OWN + 15, OWN + 16
 EXACT = CODE + 4 * MOST_STEPS
 MOST_ROOTS = 1024           # along one line
+UNPROVEN, GIVEN_UP = 1, 2   # bits of Rays.doubt: the hit has no proof; the search for a nearer one was not brought to its end
 
 
 class Expression(Formula):
@@ -156,6 +157,8 @@ def intersect(rays, n, tree, table, first, opacity):
     exact, code, local = table.exact, np.empty((MOST_STEPS, 4)), np.empty((RAY_ROWS, PACKET))
     found, doubt, roots = np.empty((1, PACKET)), np.empty(PACKET, np.uint8), np.empty((0, 2))
     single = rays.ray.itemsize == 4
+    if opacity.shape[0] == 0:
+        rays.doubt[:n] = 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree)
         node = next_leaf(walk, tree)
@@ -182,12 +185,14 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @inline
 def note_doubt(rays, i, p, found, doubt, m):
-    """After `record` of primitive p: which of rays i .. i+7 have a hit on it without a proof."""
+    """After `record` of primitive p: which of rays i .. i+7 have a hit on it without a proof, or were given up."""
     for k in range(8):
-        hit = rays.prim[i + k] == p and found[0, m + k] < np.inf
-        if hit:
-            rays.doubt[i + k] = doubt[m + k]
-        if hit or found[0, m + k] == np.inf:        # one that was given up counts too
+        if found[0, m + k] == np.inf:
+            if doubt[m + k]:
+                rays.doubt[i + k] |= GIVEN_UP
+                rays.tally[UNCERTIFIED] += 1
+        elif rays.prim[i + k] == p:
+            rays.doubt[i + k] = rays.doubt[i + k] & GIVEN_UP | UNPROVEN * doubt[m + k]
             rays.tally[UNCERTIFIED] += doubt[m + k]
 
 

@@ -1,4 +1,7 @@
-"""Polyhedron: a solid bounded by planes, by the notes' rule: a ray is inside from the last plane it enters to the first it leaves."""
+"""Polyhedron: a solid bounded by planes, by the notes' rule: a ray is inside from the last plane it enters to the first it leaves.
+
+Plain float64, with a bound on its error, says which of eight rays may be inside at all; those are clipped in double-double.
+"""
 import itertools
 from typing import Annotated
 
@@ -8,14 +11,19 @@ from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
 from rtcore.exact import dot as product, moved, parts, rationals, turned
 from rtcore.fields import Field, FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
-from rtcore.lanes import dot, greatest, least, load, load3, rounded, select, splat3, wide
+from rtcore.lanes import any_lane, dot, greatest, least, load, load3, rounded, select, size, splat3, wide
+from rtcore.pairs import add, divide, multiply, two_sum
 from rtcore.scene import Shape, invertible
+from rtcore.shapes._ball import U64, extent as length
 from rtcore.shapes.kind import FRONT, Kind, Packed, hit_from, put_surface
-from rtcore.wave import DX, OX, START, record
+from rtcore.wave import DX, OX, START, alive, record, until
 
 MOST_PLANES = 64
-#: Columns after the centre. A plane's row of Table.extra: its normal, its height above the centre, the inverse of the normal's length.
+#: Columns after the centre. A plane's row of Table.extra: its normal, its height above the centre, the inverse of the normal's length; what
+#: the first two leave of the exact ones.
 LOW, HIGH, FIRST, COUNT = 3, 6, 9, 10
+HEIGHT, INVERSE, REST, HEIGHT_REST = 3, 4, 5, 8
+DIM = 2.0 ** -98            # what sums of pairs may be off, as a share of their terms
 
 
 class Planes(Field):
@@ -61,9 +69,10 @@ class Polyhedron(Shape, frozen=True):
         center = brief(low / 2 + high / 2 if closed else points[0] @ matrix[:3, :3].T + matrix[:3, 3])
         rows = []
         for point, normal in self.planes:
-            normal = rationals(parts(turned(matrix, normal), 1))
+            normal = turned(matrix, normal)
             height = product(normal, [x - c for x, c in zip(moved(matrix, point), rationals(center))])
-            rows.append([*normal, height, 1 / np.linalg.norm(np.array(normal, float))])
+            leading, rest = np.split(np.array(parts([*normal, height])), 2)
+            rows.append([*leading, 1 / np.linalg.norm(leading[:3]), *rest])
         row = np.array([[*center, *low, *high, 0.0, len(points)]])
         return Packed(POLYHEDRON if closed else OPEN_POLYHEDRON, row, np.array(rows, float), exact=center[None])
 
@@ -114,23 +123,74 @@ def extent(points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 @inline
-def hit_solid(ray, i, exact, q, extra, first, count, side):
-    """Where eight rays meet solid q, of the planes extra[first .. first + count - 1], in float64, and whether they do."""
+def plainly(o, d, extra, k):
+    """Where eight rays cross plane k, plainly: what t may be off, t, the speed toward the front, how far behind the plane they start and
+    what that may be off. The first is infinite, or NaN, along the plane."""
+    normal = splat3(extra, k, 0)
+    height, speed, most = extra[k, HEIGHT] - dot(normal, o), dot(normal, d), length(normal)
+    blur = 16 * U64 * (abs(extra[k, HEIGHT]) + most * length(o))
+    t = height / speed
+    return (blur + 16 * U64 * most * length(d) * size(t)) / size(speed) + 4 * U64 * size(t), t, speed, height, blur
+
+
+@inline
+def may_meet(ray, i, exact, q, extra, first, count):
+    """Of eight rays, plainly: those that may be in solid q, of the planes extra[first .. first + count - 1], within their interval; a t
+    that they surely do not enter it before, or their start, and one that they surely do not leave it after, or their end."""
     o, d = wide(load3(ray, OX, i)) - splat3(exact, q, 0), wide(load3(ray, DX, i))
-    start = load(ray, START, i)
-    enter, leave = 0 * d.x - np.inf, 0 * d.x + np.inf
+    enter, leave = wide(load(ray, START, i)), until(ray, i)
+    there = alive(ray, i)
     for k in range(first, first + count):
-        normal = splat3(extra, k, 0)
-        height = extra[k, 3] - dot(normal, o)       # how far behind the plane the ray starts
-        speed = dot(normal, d)
-        t = height / speed
+        slack, t, speed, height, blur = plainly(o, d, extra, k)
+        steep = slack < np.inf
+        enter = select(steep & (speed < 0), greatest(t - slack, enter), enter)
+        leave = select(steep & (speed > 0), least(t + slack, leave), leave)
+        there = there & (steep | ~(height < -blur) | (size(speed) > 0))
+    return there & ~(enter > leave), enter, leave
+
+
+@inline
+def height_of(normal, rest, x, y, z):
+    """normal·(x, y, z) in pairs, and the size of its terms."""
+    p, p1 = multiply(normal.x, rest.x, x[0], x[1])
+    q, q1 = multiply(normal.y, rest.y, y[0], y[1])
+    r, r1 = multiply(normal.z, rest.z, z[0], z[1])
+    s, s1 = add(p, p1, q, q1)
+    s, s1 = add(s, s1, r, r1)
+    return s, s1, size(p) + size(q) + size(r)
+
+
+@inline
+def hit_solid(ray, i, exact, q, extra, first, count, near, side):
+    """Where eight rays meet solid q, in their precision, and whether they do; in double-double. near: what `may_meet` says; planes that
+    can't be the last entered nor the first left are passed over. Rays that miss an edge, or leave the direction of a plane, by less than
+    DIM of the way count as touching it, or along it."""
+    o, d, c, start = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0), load(ray, START, i)
+    x, y, z, zero = two_sum(o.x, -c.x), two_sum(o.y, -c.y), two_sum(o.z, -c.z), 0 * o.x
+    enter, enter1, leave, leave1 = zero - np.inf, zero, zero + np.inf, zero
+    todo, soonest, latest = near
+    for k in range(first, first + count):
+        slack, t, speed, _, _ = plainly(o - c, d, extra, k)
+        if not any_lane(todo & ~((speed < 0) & (t + slack < soonest) | (speed > 0) & (t - slack > latest))):
+            continue
+        normal, rest = splat3(extra, k, 0), splat3(extra, k, REST)
+        h, h1, terms = height_of(normal, rest, x, y, z)
+        h, h1 = add(zero + extra[k, HEIGHT], zero + extra[k, HEIGHT_REST], -h, -h1)     # how far behind the plane the ray starts
+        speed, speed1, most = height_of(normal, rest, (d.x, zero), (d.y, zero), (d.z, zero))
+        along = size(speed) <= DIM * most
+        t, t1 = divide(h, h1, speed, speed1)
         # a ray along the plane is never behind it if it starts before it
-        enter = select(speed < 0, greatest(t, enter), select((speed == 0) & (height < 0), np.inf, enter))
-        leave = select(speed > 0, least(t, leave), leave)
-    t = select(enter > wide(start), enter, leave)
+        beside = along & (h < -DIM * (terms + abs(extra[k, HEIGHT])))
+        last = ~along & (speed < 0) & ((t > enter) | ((t == enter) & (t1 > enter1)))
+        next_ = ~along & (speed > 0) & ((t < leave) | ((t == leave) & (t1 < leave1)))
+        enter, enter1 = select(beside, np.inf, select(last, t, enter)), select(last, t1, enter1)
+        leave, leave1 = select(next_, t, leave), select(next_, t1, leave1)
+    apart = select((enter > -np.inf) & (leave < np.inf), (leave - enter) + (leave1 - enter1) + DIM * (size(enter) + size(leave)), 0)
+    t = rounded(enter, start)
+    t = select(t > start, t, rounded(leave, start))
     if side != 0:
-        t = enter if side & FRONT else leave
-    return rounded(t, start), (enter <= leave) & (t < np.inf)
+        t = rounded(enter, start) if side & FRONT else rounded(leave, start)
+    return t, todo & (enter < np.inf) & (apart >= 0) & (t < np.inf)
 
 
 @kernel
@@ -145,8 +205,10 @@ def intersect(rays, n, tree, table, first, opacity):
                 for g in range(PACKET // 8):
                     if (walk.state[1] >> g) & 1:
                         i = start + g * 8
-                        t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, table.side[q])
-                        record(rays, i, first + q, t, ok, opacity)
+                        near = may_meet(rays.ray, i, table.exact, q, table.extra, begins, count)
+                        if any_lane(near[0]):
+                            t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, near, table.side[q])
+                            record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
             node = next_leaf(walk, tree)
 
@@ -156,8 +218,10 @@ def intersect_open(rays, n, tree, table, first, opacity):
     for q in range(table.data.shape[0]):
         begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
         for i in range(0, n, 8):
-            t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, table.side[q])
-            record(rays, i, first + q, t, ok, opacity)
+            near = may_meet(rays.ray, i, table.exact, q, table.extra, begins, count)
+            if any_lane(near[0]):
+                t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, near, table.side[q])
+                record(rays, i, first + q, t, ok, opacity)
 
 
 @kernel
@@ -172,11 +236,11 @@ def surface(rays, n, out, table, first):
             # the face is the plane that the point is nearest to; the point is put onto it
             best, off, reach = 0, -np.inf, 0.0
             for k in range(int(data[q, FIRST]), int(data[q, FIRST] + data[q, COUNT])):
-                h = (extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, 3]) * extra[k, 4]
-                reach = max(reach, abs(extra[k, 3] * extra[k, 4]))
+                h = (extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, HEIGHT]) * extra[k, INVERSE]
+                reach = max(reach, abs(extra[k, HEIGHT] * extra[k, INVERSE]))
                 if h > off:
                     best, off = k, h
-            nx, ny, nz = extra[best, 0] * extra[best, 4], extra[best, 1] * extra[best, 4], extra[best, 2] * extra[best, 4]
+            nx, ny, nz = extra[best, 0] * extra[best, INVERSE], extra[best, 1] * extra[best, INVERSE], extra[best, 2] * extra[best, INVERSE]
             x, y, z = x - off * nx, y - off * ny, z - off * nz
             u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
             put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))) + reach)

@@ -19,7 +19,7 @@ from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3
 from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
-from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs
+from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs, noise_here
 from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
                                 put_surface, unit_hit)
 from rtcore.wave import DX, OX, START, T, U, alive, record, until
@@ -106,7 +106,7 @@ def meet(ray, i, data, exact, q, todo, far, near, side):
     f, f1 = vec3(x, y, z) * unpower, vec3(x1, y1, z1) * unpower
     end, zero = load(ray, T, i), 0 * x
     s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero,
-                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, until(ray, i) * unpower, side)
+                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, until(ray, i) * unpower, side, end)
     return rounded(s * np.float64(data[q, 4]), end), found, unsure
 
 
@@ -195,7 +195,7 @@ def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     most, end, zero = np.float64(data[q, MOST]), load(ray, T, i), 0 * f.x
     s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(splat3(exact, q, PLACE)),
-                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), until(ray, i), side)
+                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), until(ray, i), side, end)
     return rounded(s, end), found, unsure
 
 
@@ -212,7 +212,8 @@ def settle_ellipsoid(rays, i, p, table, q, opacity):
     out_of_line()
     f, d = np.empty((3, LONG)), np.empty((3, LONG))
     far, speed = line_expanded(rays.ray, i, table.exact, q, f, d)
-    settle_one(rays, i, p, f, d, noise_of(f, d, far, speed, 1.0, 0.0, 1.0), 1.0, 0.0, 1.0, table.side[q], opacity)
+    noise = noise_of(f, d, far, speed, 1.0, 0.0, 1.0, noise_here(table.exact, q, 0, 0))
+    settle_one(rays, i, p, f, d, noise, 1.0, 0.0, 1.0, table.side[q], opacity)
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Where the first hit is proven: the picture in grey, orange where a formula's root was not certified."""
+"""Where the first hit is proven: the picture in grey, orange where a formula's root, or that there is none, was not certified."""
 import numpy as np
 
 from rtcore.views.view import View
@@ -8,8 +8,7 @@ ORANGE = np.array((1.0, 0.25, 0.0), np.float32)
 
 def draw(seen):
     shown = np.repeat(0.6 * (seen.pixels @ np.array((0.2126, 0.7152, 0.0722), np.float32))[:, :, None], 3, axis=2)
-    uncertain = (seen.doubt != 0) & (seen.node >= 0)
-    shown[uncertain] = 0.3 * shown[uncertain] + 0.7 * ORANGE
+    shown[seen.doubt != 0] = 0.3 * shown[seen.doubt != 0] + 0.7 * ORANGE
     return shown
 
 
