@@ -92,6 +92,7 @@ def picture(bench: Bench, name: str, path: Path, judged: bool) -> Iterator[Row]:
     if "tachyon" in bench.against:
         if path.suffix.lower() == ".nff":
             runners["tachyon"] = lambda: tachyon_seconds(path.resolve(), size, THREADS, bench.folder)
+            bench.note("Tachyon draws NFF files mirrored, at a wider angle and without refraction: that is what its times are of")
         else:
             bench.note(f"Tachyon is not given {name}: it is no NFF file")
     found = bench.measure(name, runners)

@@ -16,6 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from PIL import Image
+
 from rtcore.reports.bench.timing import RivalFailed
 
 PATIENCE = 600      # seconds that one run may take
@@ -64,11 +66,15 @@ def povray_seconds(scene: Path, size: tuple[int, int], threads: int) -> float:
 
 def tachyon_seconds(scene: Path, size: tuple[int, int], threads: int, folder: Path) -> float:
     """Ray-tracing time of Tachyon for an .nff file."""
+    picture = folder / "tachyon.tga"
     said = _said(["tachyon", str(scene), "-res", str(size[0]), str(size[1]), "-raydepth", str(DEPTH), "-numthreads", str(threads),
-                  "+V", "-o", str(folder / "tachyon.tga")], folder)
+                  "+V", "-o", str(picture)], folder)
     found = re.findall(r"Ray Tracing Time:\s*([\d.]+) seconds", said)
     if not found:
         raise RivalFailed(f"told no ray-tracing time: {_last_line(said)}")
+    with Image.open(picture) as image:
+        if all(low == high for low, high in image.convert("RGB").getextrema()):
+            raise RivalFailed("it drew nothing, a picture of one colour")       # of gears.nff, for one
     return float(found[-1])
 
 
