@@ -1,48 +1,37 @@
-"""Bounding volume hierarchy: build, walk, validate.
+"""Bounding volume hierarchy: build and validate; `walk.py` walks it.
 
-The tree is binary, built by binned surface area (Wald 2007), stored depth first: a node's left child follows it. Boxes are float32 in
-the tree's own frame, (world - center)·scale, where the root fits into -1 .. 1: so a scene far from the origin or of any size costs
-nothing in precision. The walk takes packets of 64 rays as 8 vectors with a bit per vector still in the node. A ray enters the frame at
-the root's box and with a direction whose largest part is 1, so distance and speed cost nothing either, and no inf or NaN can arise.
-Tests are conservative: the origin is shifted outward by a bound on all rounding (SLACK), so no true hit is ever culled.
+Built binary by binned surface area (Wald 2007), then collapsed so that a node has up to eight children, whose boxes one vector instruction
+tests together. Boxes are float32 in the tree's own frame, (world - center)·scale, where the root fits into -1 .. 1: so a scene far from the
+origin or of any size costs nothing in precision.
 """
 from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, bits, fma, greatest, along, least, load, load3, narrow, select, size, store, vec3, with_sign
-from rtcore.wave import DX, OX, START, T
+from rtcore.jit import kernel
 
-PACKET = 64
-GROUPS = PACKET // 8
+WIDTH = 8               # children of a node, and primitives in a leaf, at most
 BINS = 16
 DEEPEST = 48            # below this, splits halve: the stack is bounded whatever the input
-STACK = 96
-SLACK = np.float32(2.0 ** -21)
-TINY = 2.0 ** -60       # a direction's part that counts as 0
+STACK = (DEEPEST + 32) * (WIDTH - 1) + 1     # nodes that wait at once: seven a level, at most
 
 
 class Tree(NamedTuple):
-    """box (n, 6) float32: low, high in the tree's frame. link (n, 2) int32: leaf: first primitive, count; inner node: right child,
-    -1 - axis. frame (4,) float64: center, scale."""
+    """box (8 m, 8) float32 and link (8 m, 8) int32, the same memory: eight rows a node, a column a child, four cache lines in all.
+
+    Rows 0 to 5 of a node, in `box`: low x, y, z and high x, y, z of the children in the tree's frame; where there is no child, a box inside
+    out, which nothing meets. Row 6, in `link`: a child's node, or for a leaf -1 - (8 first + count - 1) of its primitives. Row 7 is unused.
+    frame (4,) float64: center, scale. Node 0 is the root; a node comes after its parent.
+    """
 
     box: np.ndarray
     link: np.ndarray
     frame: np.ndarray
 
 
-class Walk(NamedTuple):
-    """Scratch of one packet's walk."""
-
-    coarse: np.ndarray  # float32 (10, 64): 1/direction, offsets of low and of high planes, reach; in the tree's frame
-    fine: np.ndarray    # P (2, 64): where the ray enters the frame, how its t scales
-    stack: np.ndarray   # int32
-    mask: np.ndarray    # int64: the vectors that wait for the node on the stack
-    state: np.ndarray   # int64: top of stack, active vectors, signs of the direction
-
-
-EMPTY_TREE = Tree(np.zeros((0, 6), np.float32), np.zeros((0, 2), np.int32), np.zeros(4))
+NODE, LINK = 8, 6       # rows of a node, and which of them holds the links
+EMPTY_TREE = Tree(np.zeros((0, WIDTH), np.float32), np.zeros((0, WIDTH), np.int32), np.zeros(4))
+NOWHERE = 2.0 ** 60     # low of a box inside out; times any inverse direction still a float32
 
 
 # --- build ---
@@ -51,7 +40,7 @@ EMPTY_TREE = Tree(np.zeros((0, 6), np.float32), np.zeros((0, 2), np.int32), np.z
 def _split(low, high, leaf_most, box, link, order):
     """Fill box, link and order; returns the number of nodes."""
     n = low.shape[0]
-    stack = np.empty((STACK * 2, 4), np.int32)      # first, last, parent whose right child this is, depth
+    stack = np.empty((2 * (DEEPEST + 32), 4), np.int32)      # first, last, parent whose right child this is, depth
     stack[0] = np.array([0, n, -1, 0], np.int32)
     top, nodes = 1, 0
     bin_low, bin_high = np.empty((BINS, 3)), np.empty((BINS, 3))
@@ -129,8 +118,54 @@ def _split(low, high, leaf_most, box, link, order):
     return nodes
 
 
+@kernel
+def _widen(box, link, wide, children):
+    """The binary tree with up to eight children a node: the largest inner child gives way to its two until there are eight. Returns the
+    number of nodes; wide and children, as `Tree.box` and `Tree.link`, have room for as many as the binary tree has."""
+    stack = np.empty((DEEPEST + 32) * WIDTH, np.int32)      # binary nodes that become wide ones
+    slot = np.empty((DEEPEST + 32) * WIDTH, np.int32)       # where their number belongs: 8 parent + column
+    kids = np.empty(WIDTH, np.int32)
+    stack[0], slot[0] = 0, -1
+    top, nodes = 1, 0
+    while top > 0:
+        top -= 1
+        node, nodes = nodes, nodes + 1
+        if slot[top] >= 0:
+            children[NODE * (slot[top] // WIDTH) + LINK, slot[top] % WIDTH] = node
+        kids[0] = stack[top]
+        n = 1
+        while n < WIDTH:
+            widest, best = -1, -1.0
+            for k in range(n):
+                b = kids[k]
+                if link[b, 1] <= 0:
+                    ex, ey, ez = box[b, 3] - box[b, 0], box[b, 4] - box[b, 1], box[b, 5] - box[b, 2]
+                    area = ex * ey + ey * ez + ez * ex
+                    if area > best:
+                        widest, best = k, area
+            if widest < 0:
+                break
+            b = kids[widest]
+            kids[widest], kids[n] = b + 1, link[b, 0]
+            n += 1
+        for k in range(WIDTH):
+            for row in range(3):
+                wide[NODE * node + row, k], wide[NODE * node + 3 + row, k] = NOWHERE, -NOWHERE
+            children[NODE * node + LINK, k] = -1
+        for k in range(n):
+            b = kids[k]
+            for row in range(6):
+                wide[NODE * node + row, k] = box[b, row]
+            if link[b, 1] > 0:
+                children[NODE * node + LINK, k] = -1 - (WIDTH * link[b, 0] + link[b, 1] - 1)
+            else:
+                stack[top], slot[top] = b, WIDTH * node + k
+                top += 1
+    return nodes
+
+
 def build(low: np.ndarray, high: np.ndarray, leaf_most: int) -> tuple[Tree, np.ndarray]:
-    """A tree over n >= 1 boxes, low and high (n, 3) float64, with leaves of at most `leaf_most` (one leaf if there are no more).
+    """A tree over n >= 1 boxes, low and high (n, 3) float64, with leaves of at most `leaf_most` <= 8 (one leaf if there are no more).
 
     Returns the tree and the order (n,) in which the primitives have to be stored: the tree counts them so.
     """
@@ -146,145 +181,48 @@ def build(low: np.ndarray, high: np.ndarray, leaf_most: int) -> tuple[Tree, np.n
     else:
         box, link = np.empty((2 * n, 6)), np.empty((2 * n, 2), np.int32)
         nodes = _split(low, high, leaf_most, box, link, order)
-        box, link = box[:nodes], link[:nodes].copy()
+        box, link = box[:nodes], link[:nodes]
     outward = box.astype(np.float32)
     outward[:, :3] = np.nextafter(outward[:, :3], np.float32(-np.inf))
     outward[:, 3:] = np.nextafter(outward[:, 3:], np.float32(np.inf))
-    return Tree(outward, link, np.array([*center, scale])), order
+    rows = _lines(NODE * (len(box) // 2 + 1))
+    nodes = _widen(outward, link, rows.view(np.float32), rows)
+    kept = _lines(NODE * nodes)
+    kept[:] = rows[:NODE * nodes]
+    return Tree(kept.view(np.float32), kept, np.array([*center, scale])), order
+
+
+def _lines(rows: int) -> np.ndarray:
+    """(rows, 8) int32, nodes at the start of cache lines."""
+    room = np.empty(rows * WIDTH + 16, np.int32)
+    skip = -room.ctypes.data % 64 // 4
+    return room[skip:skip + rows * WIDTH].reshape(rows, WIDTH)
+
+
+def leaf_range(link: int) -> tuple[int, int]:
+    """First primitive and the one after the last of a leaf, from its entry in `Tree.link`."""
+    code = -1 - int(link)
+    return code // WIDTH, code // WIDTH + code % WIDTH + 1
 
 
 def validate(tree: Tree, low: np.ndarray, high: np.ndarray) -> None:
-    """Raise AssertionError unless every box (in the tree's order) lies in its leaf, every node in its parent, each leaf once."""
+    """Raise AssertionError unless every box (in the tree's order) lies in its leaf, every child in its parent, each primitive in one leaf,
+    and a walk needs no more than its stack."""
     low, high = (low - tree.frame[:3]) * tree.frame[3], (high - tree.frame[:3]) * tree.frame[3]
     seen = np.zeros(len(low), int)
-    todo = [(0, 0)]
+    todo = [(0, np.full(3, -np.inf), np.full(3, np.inf), 1)]
     while todo:
-        node, depth = todo.pop()
-        first, count = tree.link[node]
-        assert depth < STACK - 2, "deeper than the stack"
-        if count > 0:
-            seen[first:first + count] += 1
-            inside = (low[first:first + count] >= tree.box[node, :3]) & (high[first:first + count] <= tree.box[node, 3:])
-            assert inside.all(), f"a primitive sticks out of leaf {node}"
-            continue
-        for child in (node + 1, first):
-            inside = (tree.box[child, :3] >= tree.box[node, :3]).all() and (tree.box[child, 3:] <= tree.box[node, 3:]).all()
-            assert inside, f"node {child} sticks out"
-            todo.append((child, depth + 1))
+        node, around_low, around_high, waiting = todo.pop()
+        box = tree.box[NODE * node:NODE * node + 6].T
+        there = box[:, 0] <= box[:, 3]
+        waiting += np.count_nonzero(there) - 1
+        assert waiting <= STACK, "deeper than the stack"
+        for link, low_, high_ in zip(tree.link[NODE * node + LINK][there], box[there, :3], box[there, 3:]):
+            assert (low_ >= around_low).all() and (high_ <= around_high).all(), f"a child of node {node} sticks out"
+            if link >= 0:
+                todo.append((int(link), low_, high_, waiting))
+                continue
+            first, last = leaf_range(link)
+            seen[first:last] += 1
+            assert (low[first:last] >= low_).all() and (high[first:last] <= high_).all(), f"a primitive sticks out of a leaf of node {node}"
     assert (seen == 1).all(), "a primitive in no leaf or in several"
-
-
-# --- walk ---
-
-@inline
-def new_walk(rays):
-    """Scratch for walks over these rays."""
-    return Walk(np.empty((10, PACKET), np.float32), np.empty((2, PACKET), rays.ray.dtype), np.empty(STACK, np.int32),
-                np.empty(STACK, np.int64), np.empty(3, np.int64))
-
-
-@inline
-def begin(walk, rays, start, n, tree):
-    """Bring the packet of rays start .. min(start + 64, n) to the tree's root."""
-    eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
-    frame = tree.frame
-    groups = min(GROUPS, (n - start + 7) // 8)
-    alive = 0
-    for g in range(groups):
-        i = start + g * 8
-        o = load3(rays.ray, OX, i)
-        d = load3(rays.ray, DX, i)
-        longest = greatest(greatest(size(d.x), size(d.y)), size(d.z))
-        d = d * (1 / longest)
-        # 0 * longest makes each splat a lane vector of the rays' own type
-        center = vec3(0 * longest + frame[0], 0 * longest + frame[1], 0 * longest + frame[2])
-        o = (o - center) * frame[3]
-        speed = longest * frame[3]
-        ix = 1 / with_sign(greatest(size(d.x), TINY), d.x)
-        iy = 1 / with_sign(greatest(size(d.y), TINY), d.y)
-        iz = 1 / with_sign(greatest(size(d.z), TINY), d.z)
-        away = greatest(greatest(size(o.x), size(o.y)), size(o.z)) * eps
-        edge = away + 1.001
-        x0, y0, z0 = (-edge - o.x) * ix, (-edge - o.y) * iy, (-edge - o.z) * iz
-        x1, y1, z1 = (edge - o.x) * ix, (edge - o.y) * iy, (edge - o.z) * iz
-        enter = greatest(greatest(least(x0, x1), least(y0, y1)), greatest(least(z0, z1), 0))
-        leave = least(least(greatest(x0, x1), greatest(y0, y1)), greatest(z0, z1))
-        far = load(rays.ray, T, i)
-        meets = (enter <= leave) & (far > load(rays.ray, START, i))
-        if any_lane(meets):
-            alive |= 1 << g
-        o = along(o, enter, d)
-        store(walk.fine, 0, g * 8, enter)
-        store(walk.fine, 1, g * 8, speed)
-        kx, ky, kz = fma(size(o.x) + 1, SLACK, away), fma(size(o.y) + 1, SLACK, away), fma(size(o.z) + 1, SLACK, away)
-        store(walk.coarse, 0, g * 8, narrow(ix))
-        store(walk.coarse, 1, g * 8, narrow(iy))
-        store(walk.coarse, 2, g * 8, narrow(iz))
-        store(walk.coarse, 3, g * 8, narrow(-(o.x + kx) * ix))
-        store(walk.coarse, 4, g * 8, narrow(-(o.y + ky) * iy))
-        store(walk.coarse, 5, g * 8, narrow(-(o.z + kz) * iz))
-        store(walk.coarse, 6, g * 8, narrow(-(o.x - kx) * ix))
-        store(walk.coarse, 7, g * 8, narrow(-(o.y - ky) * iy))
-        store(walk.coarse, 8, g * 8, narrow(-(o.z - kz) * iz))
-        store(walk.coarse, 9, g * 8, select(meets, _reach(far, speed, enter), np.float32(-1)))
-    signs = 0
-    for k in range(3):
-        if rays.ray[DX + k, start] < 0:
-            signs |= 1 << k
-    walk.stack[0] = 0
-    walk.mask[0] = alive
-    walk.state[0] = 1 if alive else 0
-    walk.state[2] = signs
-
-
-@inline
-def _reach(far, speed, enter):
-    """How far past its entry a ray may still hit, in the tree's frame, float32 rounded up."""
-    return narrow(far * speed - enter + fma(enter, SLACK, SLACK)) * np.float32(1 + 2.0 ** -20)
-
-
-@inline
-def shrink(walk, rays, start):
-    """After a leaf: the active vectors need not look past what they hit."""
-    for g in range(GROUPS):
-        if (walk.state[1] >> g) & 1:
-            reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
-            store(walk.coarse, 9, g * 8, least(load(walk.coarse, 9, g * 8), reach))
-
-
-@inline
-def _meets(coarse, i, l0, l1, l2, h0, h1, h2):
-    ix, iy, iz = load(coarse, 0, i), load(coarse, 1, i), load(coarse, 2, i)
-    x0, y0, z0 = fma(l0, ix, load(coarse, 3, i)), fma(l1, iy, load(coarse, 4, i)), fma(l2, iz, load(coarse, 5, i))
-    x1, y1, z1 = fma(h0, ix, load(coarse, 6, i)), fma(h1, iy, load(coarse, 7, i)), fma(h2, iz, load(coarse, 8, i))
-    near = greatest(greatest(least(x0, x1), least(y0, y1)), greatest(least(z0, z1), np.float32(0)))
-    far = least(least(greatest(x0, x1), greatest(y0, y1)), least(greatest(z0, z1), load(coarse, 9, i)))
-    return bits(near <= far) != 0
-
-
-@inline
-def next_leaf(walk, tree):
-    """The next leaf that a ray of the packet may hit, or -1; `walk.state[1]` tells the vectors that may."""
-    top = walk.state[0]
-    while top > 0:
-        top -= 1
-        node, waiting = walk.stack[top], walk.mask[top]
-        l0, l1, l2 = tree.box[node, 0], tree.box[node, 1], tree.box[node, 2]
-        h0, h1, h2 = tree.box[node, 3], tree.box[node, 4], tree.box[node, 5]
-        active = 0
-        for g in range(GROUPS):
-            if (waiting >> g) & 1 and _meets(walk.coarse, g * 8, l0, l1, l2, h0, h1, h2):
-                active |= 1 << g
-        if active == 0:
-            continue
-        count = tree.link[node, 1]
-        if count > 0:
-            walk.state[0], walk.state[1] = top, active
-            return node
-        near, far = node + 1, tree.link[node, 0]
-        if (walk.state[2] >> (-1 - count)) & 1:
-            near, far = far, near
-        walk.stack[top], walk.stack[top + 1] = far, near
-        walk.mask[top], walk.mask[top + 1] = active, active
-        top += 2
-    return -1

@@ -122,7 +122,7 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         seen = np.float64 if exact.shape[1] else dtype
         low, high = kind.bounds(data.astype(seen).astype(np.float64), extra.astype(seen).astype(np.float64))
         tree, order = build(low, high, kind.leaf_most)
-        has_tree = len(tree.box) > 1
+        has_tree = len(data) > kind.leaf_most
         data, owner, side, exact = data[order], owner[order], side[order], exact[order]
         if len(extra) and not kind.shared_extra:
             extra = extra[order]

@@ -232,6 +232,46 @@ def any_lane(tc, mask):
     return types.boolean(mask), lambda ctx, b, sig, a: b.icmp_unsigned("!=", b.bitcast(a[0], I8), I8(0))
 
 
+def _reduced(name):
+    def make(tc, x):
+        suffix = "v8f32" if x == F32 else "v8f64"
+
+        def gen(ctx, b, sig, a):
+            t = ir.FunctionType(REAL[x.elem], [a[0].type])
+            return b.call(cgutils.get_or_insert_function(b.module, t, f"llvm.vector.reduce.{name}.{suffix}"), a)
+        return x.elem(x), gen
+    return make
+
+
+@intrinsic
+def smallest(tc, x):
+    """The smallest of the eight, a number."""
+    return _reduced("fmin")(tc, x)
+
+
+@intrinsic
+def largest(tc, x):
+    """The largest of the eight, a number."""
+    return _reduced("fmax")(tc, x)
+
+
+@intrinsic
+def lowest_bit(tc, number):
+    """Number of the lowest bit that is set in an int64 other than 0."""
+    def gen(ctx, b, sig, a):
+        t = ir.IntType(64)
+        count = cgutils.get_or_insert_function(b.module, ir.FunctionType(t, [t, ir.IntType(1)]), "llvm.cttz.i64")
+        return b.call(count, [a[0], ir.Constant(ir.IntType(1), 1)])
+    return types.int64(types.int64), gen
+
+
+@intrinsic
+def splat(tc, number):
+    """Eight lanes of one number, float32 or float64."""
+    v = LANES_OF[number]
+    return v(number), lambda ctx, b, sig, a: _splat(b, a[0])
+
+
 @intrinsic
 def narrow(tc, x):
     """Lanes rounded to float32."""
@@ -337,6 +377,19 @@ def store(tc, array, row, i, x):
         b.store(a[3], _at(ctx, b, sig, a, REAL[x.elem], LANES), align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, types.intp, x), gen
+
+
+@intrinsic
+def prefetch(tc, array, row):
+    """Have the processor fetch the first four cache lines of a row, which will be read soon. array: 2-D, C-contiguous."""
+    def gen(ctx, b, sig, a):
+        p = b.bitcast(_at(ctx, b, sig, (*a, ir.Constant(ir.IntType(64), 0)), None, 1), I8.as_pointer())
+        t = ir.FunctionType(ir.VoidType(), [I8.as_pointer(), I32, I32, I32])
+        function = cgutils.get_or_insert_function(b.module, t, "llvm.prefetch.p0i8")
+        for line in range(4):
+            b.call(function, [b.gep(p, [I32(64 * line)]), I32(0), I32(3), I32(1)])
+        return ctx.get_dummy_value()
+    return types.void(array, types.intp), gen
 
 
 @intrinsic

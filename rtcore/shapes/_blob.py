@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline
+from rtcore.jit import inline, inline_new
 from rtcore.pairs import add, divide, scale, square, two_product
 from rtcore.shapes._ball import advance
 from rtcore.shapes.kind import BACK, FRONT
@@ -44,7 +44,7 @@ class Scratch(NamedTuple):
     line: np.ndarray        # float64 (rows, 8): eight rays in unit space, see POINT ..
 
 
-@inline
+@inline_new
 def new_scratch(rays):
     return Scratch(np.empty((MOST_ELEMENTS, 6)), np.empty((MOST_ELEMENTS, 5)), np.empty(2 * MOST_ELEMENTS + 1),
                    np.empty(2 * MOST_ELEMENTS, np.int64), np.empty(MOST_ELEMENTS, np.int64), np.empty((DEEPEST + 4, 8)),

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from rtcore.expansions import LONG, expand, put_products
-from rtcore.jit import inline, kernel, out_of_line
+from rtcore.jit import inline, inline_new, kernel, out_of_line
 from rtcore.pairs import add, divide, multiply, scale, square, square_root, two_product, two_sum
 from rtcore.shapes._blob import RADIUS, ROUGH, STRENGTH
 from rtcore.shapes._separate import between, stationary_of, value_at
@@ -22,7 +22,7 @@ DIM = 2.0 ** -94        # more than a sum of pairs may be off, as a share of the
 LOW, LOW1, HIGH, HIGH1 = 6, 7, 8, 9     # of a span, after three coefficients: where it begins and ends
 
 
-@inline
+@inline_new
 def closest(f, v, n):
     """The point of the line f + s v nearest to the origin, as expansions in n, and its s as a pair."""
     terms = np.empty(3 * LONG * LONG)

@@ -6,7 +6,7 @@ without width; what comes out is then its value with a bound on all rounding.
 """
 import numpy as np
 
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline_new, kernel
 from rtcore.lanes import greatest, least, load, root, select, size, store
 from rtcore.shapes._formula import (ABS, ADD, ADD_C, C_DIVIDE, C_SUB, CONSTANT, COSINE, DIVIDE, DIVIDE_C, EXP, FLOOR, LOG, MAX, MIN,
                                     MOST_STEPS, MULTIPLY, MULTIPLY_C, NEGATE, POWER, REAL_POWER, ROOT, SINE, SMOOTH_MIN, SQUARE, SUB,
@@ -20,7 +20,7 @@ LOW, HIGH, D_LOW, D_HIGH = range(4)
 INPUT, DIRECTION, VALUE, SLOPE, GONE, ROUGH, AT_ROWS = 0, 6, 9, 11, 13, 14, 15
 
 
-@inline
+@inline_new
 def new_registers():
     """What `run` works on; the last two rows are spare."""
     return np.empty((4 * MOST_STEPS + 2, 8))

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Field, FieldError, Number, Vec, Vector
 from rtcore.jit import inline, kernel
@@ -152,14 +152,14 @@ def intersect(rays, n, tree, table, first, opacity):
     walk, scratch = new_walk(rays), new_scratch(rays)
     data = table.data
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 count = take_elements(scratch.element, data, q, table.extra)
                 threshold = np.float64(data[q, THRESHOLD]) + np.float64(data[q, THRESHOLD + 1])
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i, hit, late = start + g * 8, 0, 0
                         take_lines(rays.ray, i, table.exact, q, scratch.line)
                         for lane in range(8):
@@ -176,7 +176,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                    opacity)
                             late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @inline

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, parts
 from rtcore.fields import FieldError, Formula, Vec, Vector
 from rtcore.jit import inline, kernel
@@ -160,19 +160,19 @@ def intersect(rays, n, tree, table, first, opacity):
     if opacity.shape[0] == 0:
         rays.doubt[:n] = 0
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 m = 0
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         bring(rays, start + g * 8, exact, q, local, m)
                         m += 8
                 march(take_code(code, exact, q), search, local, m, table.side[q], single, found[0], doubt, roots)
                 m = 0
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
                         t = rounded(load(found, 0, m), load(rays.ray, T, i))
                         record(rays, i, first + q, t, t < np.inf, opacity)
@@ -180,7 +180,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             note_doubt(rays, i, first + q, found, doubt, m)
                         m += 8
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @inline

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import moved, rationals
 from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.jit import inline, kernel
@@ -88,13 +88,13 @@ def in_outline(ray, i, extra, first, count, a, b, t):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 drop, begins, count = int(table.data[q, DROP]), int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
                         t, todo = approach(rays.ray, i, table.exact, q)
                         if any_lane(todo):
@@ -107,7 +107,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 settle(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import dot as product, moved, parts, rationals, turned
 from rtcore.fields import Field, FieldError, Vec, Vector
 from rtcore.jit import inline, kernel
@@ -197,20 +197,20 @@ def hit_solid(ray, i, exact, q, extra, first, count, near, side):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
                         near = may_meet(rays.ray, i, table.exact, q, table.extra, begins, count)
                         if any_lane(near[0]):
                             t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, near, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
 from rtcore.jit import kernel
@@ -81,13 +81,13 @@ def moved_form(coefficients, middle, half) -> list[Fraction]:
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
                         near = approach(rays.ray, i, table.exact, q, most, curved)
                         todo = may_meet(near) & alive(rays.ray, i)
@@ -99,7 +99,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 settle(rays, i + lowest(late), first + q, table, q, IN_BOX, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.expansions import LONG, expand, noise_of
 from rtcore.fields import Number, Vec, Vector
@@ -129,13 +129,13 @@ def settle_sphere(rays, i, p, table, q, opacity):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
                     i = start + g * 8
-                    if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
+                    if (walk.state[ACTIVE] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
                         far, near = approach(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
@@ -146,7 +146,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 settle_sphere(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel
@@ -220,13 +220,13 @@ def settle_ellipsoid(rays, i, p, table, q, opacity):
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        begin(walk, rays, start, n, tree, 1 << 30)
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
                     i = start + g * 8
-                    if (walk.state[1] >> g) & 1 and (table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q)):
+                    if (walk.state[ACTIVE] >> g) & 1 and (table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q)):
                         far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
@@ -237,7 +237,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                                 settle_ellipsoid(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel
@@ -260,5 +260,5 @@ def _bounds_ellipsoid(data, extra):
     return placed_bounds(data, np.sqrt((forward(data) ** 2).sum(2)))
 
 
-SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()))
+SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()), leaf_most=2)
 ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, (Sphere((0, 0, 0), 1), (Scale((1, 2, 3)),)))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.bvh import PACKET, begin, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
@@ -198,16 +198,16 @@ def intersect(rays, n, tree, table, first, opacity):
     slant, axes = np.empty((4, PACKET), rays.ray.dtype), np.empty(PACKET // 8, np.int64)
     tiny = TINY32 if rays.ray.itemsize == 4 else TINY64
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree)
-        if walk.state[0] == 0:
+        begin(walk, rays, start, n, tree, 64)
+        if walk.state[TOP] == 0:
             continue
         shear(rays, start, n, slant, axes)
-        node = next_leaf(walk, tree)
-        while node >= 0:
-            for q in range(tree.link[node, 0], tree.link[node, 0] + tree.link[node, 1]):
+        leaf = next_leaf(walk, tree)
+        while leaf >= 0:
+            for q in range(leaf_first(leaf), leaf_end(leaf)):
                 side = table.side[q]
                 for g in range(PACKET // 8):
-                    if (walk.state[1] >> g) & 1:
+                    if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
                         for axis in range(3):
                             if (axes[g] >> axis) & 1:
@@ -228,7 +228,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                         settle(rays, i + lowest(late), first + q, table, q, axis, opacity)
                                         late &= late - 1
             shrink(walk, rays, start)
-            node = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree)
 
 
 @kernel

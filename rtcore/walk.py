@@ -1,0 +1,370 @@
+"""The walk of rays through a tree: 64 at a time where they keep together, one at a time where they don't.
+
+Rays that keep together - from the eye, toward a light, off a plane mirror - are walked as a *beam*: the pyramid around them is tested
+against the eight children of a node at once. Where a child is wider than the pyramid that is all; the others and all leaves are tested
+against the rays, eight at a time. Rays that scatter are walked without a pyramid, or, through large trees, each on its own against eight
+boxes at once, several in turns, so that none waits for memory. Whichever way, `next_leaf` gives the next leaf that may be hit and the
+vectors of rays that may hit it: a shape's kernel knows no difference.
+
+A ray enters the tree's frame at the root's box and with a direction whose largest part is 1: neither distance nor speed costs precision,
+and no inf or NaN can arise. Tests are conservative: origins are shifted outward by a bound on all rounding (SLACK), so no hit is culled.
+"""
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.bvh import LINK, NODE, STACK, WIDTH
+from rtcore.jit import inline, inline_new
+from rtcore.lanes import (along, any_lane, bits, fma, greatest, largest, least, load, load3, lowest_bit, narrow, prefetch, select, size,
+                          smallest, splat, store, vec3, with_sign)
+from rtcore.wave import DX, OX, START, T
+
+PACKET = 64
+GROUPS = PACKET // 8
+SLACK = np.float32(2.0 ** -21)
+TINY = 2.0 ** -60       # a direction's part that counts as 0
+
+# rows of Walk.coarse: 1/direction, offsets of low and of high planes, reach, direction, origin
+INVERSE, LOWS, HIGHS, REACH, WAY, FROM = 0, 3, 6, 9, 10, 13
+# places in Walk.state
+TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING = range(7)
+BEAM, SINGLY, VECTORS = range(3)    # state[MODE]: the pyramid around all rays, each ray on its own, vectors of rays without a pyramid
+SLOTS = 8               # rays walked in turns
+# places in Walk.beam: over all rays the least and the largest origin and slope (the step for a step along the main axis), the main axis'
+# direction, how far any ray still reaches, and what to add to a plane for its earliest entry and latest exit
+BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6, 9, 12, 13, 14, 15
+BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
+
+#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than that; or they are walked singly.
+STRAIGHT, SPREAD = np.float32(0.4), np.float32(0.35)
+
+
+class Walk(NamedTuple):
+    """Scratch of one packet's walk."""
+
+    coarse: np.ndarray  # float32 (16, 64), rows as named above, in the tree's frame
+    fine: np.ndarray    # P (2, 64): where the ray enters the frame, how its t scales
+    beam: np.ndarray    # float32 (16), as named above
+    stack: np.ndarray   # int32 (slots, most): what waits: of single rays links, of packets 2 (8 node + column) + whether all meet it
+    entry: np.ndarray   # float32 (slots, most): where they are entered
+    mask: np.ndarray    # int64 (most): the vectors of rays that wait for a node
+    slots: np.ndarray   # int64 (slots, 2): the ray, -1 none any more; how many nodes wait
+    near: np.ndarray    # float32 (1, 8): where the children of a node are
+    state: np.ndarray   # int64, as named above
+
+
+@inline_new
+def new_walk(rays):
+    """Scratch for walks over these rays."""
+    return Walk(np.empty((16, PACKET), np.float32), np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32),
+                np.empty((SLOTS, STACK), np.int32), np.empty((SLOTS, STACK), np.float32), np.empty(STACK, np.int64),
+                np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(7, np.int64))
+
+
+@inline
+def begin(walk, rays, start, n, tree, singly):
+    """Bring the packet of rays start .. min(start + 64, n) to the tree's root. singly: how many nodes a tree must have for rays that
+    scatter to be walked singly."""
+    eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
+    frame, coarse, fine, state = tree.frame, walk.coarse, walk.fine, walk.state
+    groups = min(GROUPS, (n - start + 7) // 8)
+    alive, waiting = 0, 0
+    two = splat(np.float32(2))
+    x0, y0, z0, x1, y1, z1 = two, two, two, -two, -two, -two
+    fuzz = splat(BEAM_SLACK)
+    for g in range(groups):
+        i, j = start + g * 8, g * 8
+        o = load3(rays.ray, OX, i)
+        d = load3(rays.ray, DX, i)
+        longest = greatest(greatest(size(d.x), size(d.y)), size(d.z))
+        d = d * (1 / longest)
+        # 0 * longest makes each splat a lane vector of the rays' own type
+        center = vec3(0 * longest + frame[0], 0 * longest + frame[1], 0 * longest + frame[2])
+        o = (o - center) * frame[3]
+        speed = longest * frame[3]
+        ix = 1 / with_sign(greatest(size(d.x), TINY), d.x)
+        iy = 1 / with_sign(greatest(size(d.y), TINY), d.y)
+        iz = 1 / with_sign(greatest(size(d.z), TINY), d.z)
+        away = greatest(greatest(size(o.x), size(o.y)), size(o.z)) * eps
+        edge = away + 1.001
+        a0, b0, c0 = (-edge - o.x) * ix, (-edge - o.y) * iy, (-edge - o.z) * iz
+        a1, b1, c1 = (edge - o.x) * ix, (edge - o.y) * iy, (edge - o.z) * iz
+        enter = greatest(greatest(least(a0, a1), least(b0, b1)), greatest(least(c0, c1), 0))
+        leave = least(least(greatest(a0, a1), greatest(b0, b1)), greatest(c0, c1))
+        far = load(rays.ray, T, i)
+        meets = (enter <= leave) & (far > load(rays.ray, START, i))
+        if any_lane(meets):
+            alive |= 1 << g
+            waiting |= bits(meets) << j
+        o = along(o, enter, d)
+        store(fine, 0, j, enter)
+        store(fine, 1, j, speed)
+        kx, ky, kz = fma(size(o.x) + 1, SLACK, away), fma(size(o.y) + 1, SLACK, away), fma(size(o.z) + 1, SLACK, away)
+        store(coarse, INVERSE, j, narrow(ix))
+        store(coarse, INVERSE + 1, j, narrow(iy))
+        store(coarse, INVERSE + 2, j, narrow(iz))
+        store(coarse, LOWS, j, narrow(-(o.x + kx) * ix))
+        store(coarse, LOWS + 1, j, narrow(-(o.y + ky) * iy))
+        store(coarse, LOWS + 2, j, narrow(-(o.z + kz) * iz))
+        store(coarse, HIGHS, j, narrow(-(o.x - kx) * ix))
+        store(coarse, HIGHS + 1, j, narrow(-(o.y - ky) * iy))
+        store(coarse, HIGHS + 2, j, narrow(-(o.z - kz) * iz))
+        store(coarse, REACH, j, select(meets, _reach(far, speed, enter), np.float32(-1)))
+        dx, dy, dz = narrow(d.x), narrow(d.y), narrow(d.z)
+        store(coarse, WAY, j, dx)
+        store(coarse, WAY + 1, j, dy)
+        store(coarse, WAY + 2, j, dz)
+        store(coarse, FROM, j, narrow(o.x))
+        store(coarse, FROM + 1, j, narrow(o.y))
+        store(coarse, FROM + 2, j, narrow(o.z))
+        fuzz = greatest(fuzz, narrow(away))
+        x0, x1 = least(x0, select(meets, dx, two)), greatest(x1, select(meets, dx, -two))
+        y0, y1 = least(y0, select(meets, dy, two)), greatest(y1, select(meets, dy, -two))
+        z0, z1 = least(z0, select(meets, dz, two)), greatest(z1, select(meets, dz, -two))
+    state[TOP], state[WAITING], state[ALIVE] = 0, waiting, alive
+    if alive == 0 or tree.link.shape[0] == 0:
+        state[MODE] = BEAM
+    else:
+        # the axis along which all rays go the same way, and furthest
+        along_x, along_y, along_z = _common(x0, x1), _common(y0, y1), _common(z0, z1)
+        axis = 0 if along_x >= along_y and along_x >= along_z else 1 if along_y >= along_z else 2
+        state[MODE] = BEAM
+        if not max(along_x, max(along_y, along_z)) >= STRAIGHT or not _bundle(walk, axis, largest(fuzz), groups):
+            if NODE * singly <= tree.link.shape[0]:
+                state[MODE], state[RUNNING] = SINGLY, SLOTS
+                for k in range(SLOTS):
+                    walk.slots[k, 0], walk.slots[k, 1] = 0, 0
+            else:
+                state[MODE] = VECTORS
+                for k in range(3):
+                    walk.beam[SLOPE_FROM + k] = coarse[WAY + k, lowest_bit(waiting)]
+        walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP] = -1, 0, alive, 1
+
+
+@inline
+def _common(low, high):
+    """The least size of numbers that lie between the smallest of `low` and the largest of `high`; negative if they differ in sign."""
+    return max(smallest(low), -largest(high))
+
+
+@inline
+def _bundle(walk, axis, fuzz, groups):
+    """The beam around a packet's rays, which all run the same way along `axis` and are off by `fuzz` at most; whether it is narrow enough
+    to be walked."""
+    coarse, beam = walk.coarse, walk.beam
+    much = splat(np.float32(1e30))
+    x0, y0, z0, x1, y1, z1 = much, much, much, -much, -much, -much
+    u0, v0, w0, u1, v1, w1 = much, much, much, -much, -much, -much
+    farthest = -much
+    for g in range(groups):
+        j = g * 8
+        reach = load(coarse, REACH, j)
+        live = reach >= 0
+        x, y, z = load(coarse, FROM, j), load(coarse, FROM + 1, j), load(coarse, FROM + 2, j)
+        inverse = size(load(coarse, INVERSE + axis, j))
+        u, v, w = load(coarse, WAY, j) * inverse, load(coarse, WAY + 1, j) * inverse, load(coarse, WAY + 2, j) * inverse
+        x0, x1 = least(x0, select(live, x, much)), greatest(x1, select(live, x, -much))
+        y0, y1 = least(y0, select(live, y, much)), greatest(y1, select(live, y, -much))
+        z0, z1 = least(z0, select(live, z, much)), greatest(z1, select(live, z, -much))
+        u0, u1 = least(u0, select(live, u, much)), greatest(u1, select(live, u, -much))
+        v0, v1 = least(v0, select(live, v, much)), greatest(v1, select(live, v, -much))
+        w0, w1 = least(w0, select(live, w, much)), greatest(w1, select(live, w, -much))
+        farthest = greatest(farthest, reach)
+    beam[BEAM_FROM], beam[BEAM_FROM + 1], beam[BEAM_FROM + 2] = smallest(x0), smallest(y0), smallest(z0)
+    beam[BEAM_TO], beam[BEAM_TO + 1], beam[BEAM_TO + 2] = largest(x1), largest(y1), largest(z1)
+    beam[SLOPE_FROM], beam[SLOPE_FROM + 1], beam[SLOPE_FROM + 2] = smallest(u0), smallest(v0), smallest(w0)
+    beam[SLOPE_TO], beam[SLOPE_TO + 1], beam[SLOPE_TO + 2] = largest(u1), largest(v1), largest(w1)
+    beam[SIGN], beam[FARTHEST] = np.float32(1) if beam[SLOPE_FROM + axis] > 0 else np.float32(-1), largest(farthest)
+    walk.state[AXIS] = axis
+    spread = np.float32(0)
+    for k in range(3):
+        beam[BEAM_FROM + k] -= fuzz
+        beam[BEAM_TO + k] += fuzz
+        spread = max(spread, beam[SLOPE_TO + k] - beam[SLOPE_FROM + k])
+    # along the main axis: the earliest entry into a box and the latest exit, but for the box itself
+    sign = beam[SIGN]
+    beam[ENTER] = -sign * (beam[BEAM_TO + axis] if sign > 0 else beam[BEAM_FROM + axis])
+    beam[LEAVE] = -sign * (beam[BEAM_FROM + axis] if sign > 0 else beam[BEAM_TO + axis])
+    return spread <= SPREAD and fuzz < 1     # far more than that, and bounds would not be finite
+
+
+@inline
+def _reach(far, speed, enter):
+    """How far past its entry a ray may still hit, in the tree's frame, float32 rounded up."""
+    return narrow(far * speed - enter + fma(enter, SLACK, SLACK)) * np.float32(1 + 2.0 ** -20)
+
+
+@inline
+def shrink(walk, rays, start):
+    """After a leaf: the active vectors need not look past what they hit."""
+    coarse, active = walk.coarse, walk.state[ACTIVE]
+    for g in range(GROUPS):
+        if (active >> g) & 1:
+            reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
+            store(coarse, REACH, g * 8, least(load(coarse, REACH, g * 8), reach))
+    if walk.state[MODE] == BEAM:
+        farthest = splat(np.float32(-1))
+        for g in range(GROUPS):
+            if (walk.state[ALIVE] >> g) & 1:
+                farthest = greatest(farthest, load(coarse, REACH, g * 8))
+        walk.beam[FARTHEST] = largest(farthest)
+
+
+@inline
+def next_leaf(walk, tree):
+    """The next leaf that rays of the packet may hit, as `leaf_first` and `leaf_end` read it, or -1; `active` tells the vectors that may."""
+    return _next_of_ray(walk, tree) if walk.state[MODE] == SINGLY else _next_of_packet(walk, tree)
+
+
+@inline
+def leaf_first(leaf):
+    """The leaf's first primitive."""
+    return leaf // WIDTH
+
+
+@inline
+def leaf_end(leaf):
+    """The primitive after the leaf's last."""
+    return leaf // WIDTH + leaf % WIDTH + 1
+
+
+@inline
+def _next_of_ray(walk, tree):
+    """Rays singly, some in turns: while one's next node comes from memory, the others go on."""
+    coarse, stack, entry, near, state, slots = walk.coarse, walk.stack, walk.entry, walk.near, walk.state, walk.slots
+    box, link = tree.box, tree.link
+    slot, running, waiting = state[TOP], state[RUNNING], state[WAITING]
+    while running > 0:
+        slot = (slot + 1) % SLOTS
+        ray, top = slots[slot, 0], slots[slot, 1]
+        if top == 0:
+            if ray < 0:
+                continue
+            if waiting == 0:
+                slots[slot, 0] = -1
+                running -= 1
+                continue
+            slots[slot, 0], slots[slot, 1] = lowest_bit(waiting), 1
+            stack[slot, 0], entry[slot, 0] = 0, 0
+            waiting &= waiting - 1
+            continue
+        top -= 1
+        reach, node = coarse[REACH, ray], np.int64(stack[slot, top])
+        while top > 0 and not entry[slot, top] <= reach:
+            top -= 1
+            node = np.int64(stack[slot, top])
+        if not entry[slot, top] <= reach:
+            slots[slot, 1] = top
+            continue
+        if node < 0:
+            slots[slot, 1] = top
+            state[TOP], state[RUNNING], state[WAITING], state[ACTIVE] = slot, running, waiting, 1 << (ray >> 3)
+            return -1 - node
+        ix, iy, iz = coarse[INVERSE, ray], coarse[INVERSE + 1, ray], coarse[INVERSE + 2, ray]
+        # the planes that are met first, and those that are met last
+        x0, x1 = (0, 3) if ix > 0 else (3, 0)
+        y0, y1 = (1, 4) if iy > 0 else (4, 1)
+        z0, z1 = (2, 5) if iz > 0 else (5, 2)
+        row = NODE * node
+        x = fma(load(box, row + x0, 0), ix, coarse[LOWS + x0, ray])
+        y = fma(load(box, row + y0, 0), iy, coarse[LOWS + y0, ray])
+        z = fma(load(box, row + z0, 0), iz, coarse[LOWS + z0, ray])
+        u = fma(load(box, row + x1, 0), ix, coarse[LOWS + x1, ray])
+        v = fma(load(box, row + y1, 0), iy, coarse[LOWS + y1, ray])
+        w = fma(load(box, row + z1, 0), iz, coarse[LOWS + z1, ray])
+        enter = greatest(greatest(x, y), greatest(z, np.float32(0)))
+        met = bits(enter <= least(least(u, v), least(w, reach)))
+        store(near, 0, 0, enter)
+        base = top
+        while met:
+            k = lowest_bit(met)
+            met &= met - 1
+            at, there, child = near[0, k], top, link[row + LINK, k]
+            while there > base and entry[slot, there - 1] < at:
+                entry[slot, there], stack[slot, there] = entry[slot, there - 1], stack[slot, there - 1]
+                there -= 1
+            entry[slot, there], stack[slot, there] = at, child
+            top += 1
+        if top > 0 and stack[slot, top - 1] >= 0:
+            prefetch(box, NODE * np.int64(stack[slot, top - 1]))
+        slots[slot, 1] = top
+    state[TOP], state[RUNNING], state[WAITING] = slot, running, waiting
+    return -1
+
+
+@inline
+def _next_of_packet(walk, tree):
+    """All rays together: the next leaf that one of them meets. A box that is wider than the beam around them is taken to be met."""
+    coarse, beam, stack, entry, mask, near, state = walk.coarse, walk.beam, walk.stack, walk.entry, walk.mask, walk.near, walk.state
+    box, link = tree.box, tree.link
+    top, axis, bundled = state[TOP], state[AXIS], state[MODE] == BEAM
+    p, q = (axis + 1) % 3, (axis + 2) % 3
+    sign, farthest = beam[SIGN], beam[FARTHEST]
+    main0, main1 = (axis, axis + 3) if sign > 0 else (axis + 3, axis)
+    while top > 0:
+        top -= 1
+        place, waiting, node = np.int64(stack[0, top]), mask[top], np.int64(0)
+        if bundled and not entry[0, top] <= farthest:
+            continue
+        if place >= 0:
+            k = (place >> 1) % WIDTH
+            row = NODE * (place // (2 * WIDTH))
+            node = np.int64(link[row + LINK, k])
+            if node < 0 or place % 2 == 0:
+                waiting = _met_by(coarse, waiting, box, row, k)
+                if waiting == 0:
+                    continue
+                if node < 0:
+                    state[TOP], state[ACTIVE] = top, waiting
+                    return -1 - node
+        row = NODE * node
+        if bundled:
+            enter = greatest(fma(load(box, row + main0, 0), sign, beam[ENTER]), np.float32(0))
+            leave = least(fma(load(box, row + main1, 0), sign, beam[LEAVE]), farthest)
+            s0, s1 = beam[SLOPE_FROM + p], beam[SLOPE_TO + p]
+            low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + p]
+            high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + p]
+            a, b = load(box, row + p, 0), load(box, row + p + 3, 0)
+            ok, narrower = (enter <= leave) & (low <= b) & (high >= a), high - low <= b - a
+            s0, s1 = beam[SLOPE_FROM + q], beam[SLOPE_TO + q]
+            low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + q]
+            high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + q]
+            a, b = load(box, row + q, 0), load(box, row + q + 3, 0)
+            met, sure = bits(ok & (low <= b) & (high >= a)), bits(narrower & (high - low <= b - a))
+            store(near, 0, 0, enter)
+        else:
+            l0, l1, l2 = load(box, row, 0), load(box, row + 1, 0), load(box, row + 2, 0)
+            h0, h1, h2 = load(box, row + 3, 0), load(box, row + 4, 0), load(box, row + 5, 0)
+            met, sure = bits(l0 <= h0), 0
+            store(near, 0, 0, fma(l0 + h0, beam[SLOPE_FROM], fma(l1 + h1, beam[SLOPE_FROM + 1], (l2 + h2) * beam[SLOPE_FROM + 2])))
+        base = top
+        while met:
+            k = lowest_bit(met)
+            met &= met - 1
+            at, there = near[0, k], top
+            while there > base and entry[0, there - 1] < at:
+                entry[0, there], stack[0, there] = entry[0, there - 1], stack[0, there - 1]
+                there -= 1
+            entry[0, there], stack[0, there], mask[top] = at, 2 * (WIDTH * node + k) + ((sure >> k) & 1), waiting
+            top += 1
+    state[TOP] = 0
+    return -1
+
+
+@inline
+def _met_by(coarse, alive, box, row, k):
+    """Of the vectors of rays `alive`, those with one that meets child k of the node whose boxes start at `row`."""
+    l0, l1, l2, h0, h1, h2 = box[row, k], box[row + 1, k], box[row + 2, k], box[row + 3, k], box[row + 4, k], box[row + 5, k]
+    active = 0
+    for g in range(GROUPS):
+        if (alive >> g) & 1 == 0:
+            continue
+        j = g * 8
+        ix, iy, iz = load(coarse, INVERSE, j), load(coarse, INVERSE + 1, j), load(coarse, INVERSE + 2, j)
+        x0, y0, z0 = fma(l0, ix, load(coarse, LOWS, j)), fma(l1, iy, load(coarse, LOWS + 1, j)), fma(l2, iz, load(coarse, LOWS + 2, j))
+        x1, y1, z1 = fma(h0, ix, load(coarse, HIGHS, j)), fma(h1, iy, load(coarse, HIGHS + 1, j)), fma(h2, iz, load(coarse, HIGHS + 2, j))
+        near = greatest(greatest(least(x0, x1), least(y0, y1)), greatest(least(z0, z1), np.float32(0)))
+        far = least(least(greatest(x0, x1), greatest(y0, y1)), least(greatest(z0, z1), load(coarse, REACH, j)))
+        if any_lane(near <= far):
+            active |= 1 << g
+    return active
