@@ -1,17 +1,19 @@
-"""Scene files: one file a format. Listed once, here."""
+"""Scene files: one file a format. Listed once, here, and imported when a file of that format is opened."""
+import importlib
 import os
 
 import numpy as np
 
-from rtcore.files import image, mesh, nff, scene
+from rtcore.files import _meshes, image, scene
 from rtcore.files._errors import FileError, WriteError, unknown
 from rtcore.files._writing import writable, write_file
 from rtcore.files.image import save_image
 from rtcore.files.scene import save
 from rtcore.scene import Scene
 
-FORMATS = (scene, nff, mesh)    # each has its SUFFIXES and load(path) -> Scene
-LOADABLE = tuple(suffix for form in FORMATS for suffix in form.SUFFIXES)
+#: Module of each format, which has load(path) -> Scene, and the suffixes of its files.
+FORMATS = {"scene": scene.SUFFIXES, "nff": (".nff",), "mesh": _meshes.SUFFIXES}
+LOADABLE = tuple(suffix for suffixes in FORMATS.values() for suffix in suffixes)
 PICTURES = image.SUFFIXES
 
 __all__ = ["FORMATS", "LOADABLE", "PICTURES", "FileError", "WriteError", "load", "save", "save_image", "writable", "write_file"]
@@ -22,9 +24,9 @@ def load(path: str | os.PathLike) -> Scene:
     if os.path.isdir(path):
         raise FileError(path, "expected a file, got a folder")
     suffix = os.path.splitext(path)[1].lower()
-    for form in FORMATS:
-        if suffix in form.SUFFIXES:
+    for name, suffixes in FORMATS.items():
+        if suffix in suffixes:
             with np.errstate(all="ignore"):     # numbers near the end of the float range are for the records to judge
-                return form.load(path)
+                return importlib.import_module(f"rtcore.files.{name}").load(path)
     expected, got = unknown(suffix or os.path.basename(path), LOADABLE)
     raise FileError.expected(path, "a name that ends in " + expected, got)

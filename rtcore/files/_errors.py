@@ -1,7 +1,6 @@
 """What can be wrong with a file, in one line; and reading one with the checks that every format needs."""
 import os
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 from rtcore.fields import FieldError, shown
 
@@ -40,6 +39,7 @@ class Said(str):
 
 def unknown(word: str, words: Iterable[str]) -> tuple[str, Said]:
     """What was expected in place of an unknown word, and what was there, with the nearest known word suggested."""
+    from difflib import get_close_matches
     words = list(words)
     near = get_close_matches(word.lower(), words, 1, 0.6)
     return "one of " + ", ".join(words), Said(shown(word) + (f" (did you mean {near[0]!r}?)" if near else ""))

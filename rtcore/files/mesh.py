@@ -7,7 +7,6 @@ import numpy as np
 from rtcore.camera import Camera, frame
 from rtcore.fields import FieldError, Vec
 from rtcore.files._errors import FileError
-from rtcore.files._meshes import SUFFIXES as SUFFIXES
 from rtcore.files._meshes import Part, joined, made, read_parts
 from rtcore.lights import Ambient, Directional
 from rtcore.scene import Background, Material, Matrix, Node, Scene

@@ -19,7 +19,6 @@ from rtcore.lights import Ambient, Point
 from rtcore.scene import Background, Material, Node, Scene
 from rtcore.shapes import Cone, Cylinder, Mesh, Polygon, Sphere
 
-SUFFIXES = (".nff",)
 MOST_BYTES = 64 * 2**20
 AMBIENT = linear_from_srgb(0.1)
 BLINN = 4.0     # Phong's cosine to the power n is about as wide as Blinn's to the power 4n

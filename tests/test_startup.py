@@ -1,0 +1,79 @@
+"""Starting: importing compiles nothing and takes little more than numba does, and a render imports and loads only what it needs."""
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.gallery import FIRST_SCENE
+
+ROOT = Path(__file__).parent.parent
+
+#: Imports every module of rtcore; prints what was compiled or read from the cache meanwhile.
+EVERYTHING = """
+import importlib, pkgutil, sys
+from numba.core import event
+from numba.core.dispatcher import Dispatcher
+listener = event.RecordingListener()
+with event.install_listener("numba:compile", listener):
+    import rtcore
+    for module in list(pkgutil.walk_packages(rtcore.__path__, "rtcore.")):
+        importlib.import_module(module.name)
+kernels = [value for name, module in list(sys.modules.items()) if name.startswith("rtcore.") for value in vars(module).values()
+           if isinstance(value, Dispatcher)]
+print(len(kernels) > 100, len(listener.buffer), sum(len(kernel.signatures) for kernel in kernels))
+"""
+
+#: CPU seconds of importing what rtcore stands on, and then rtcore.
+SECONDS = "import time; import numpy, numba; a = time.process_time(); import rtcore; print(a, time.process_time() - a)"
+
+RENDER = """
+import sys
+from app.__main__ import main
+code = main(["render", {scene!r}, "-o", {out!r}, "--size", "32x24", "--spp", "1"])
+from rtcore.account import loaded_kernels
+print(code, len(loaded_kernels()), *(name for name in {names} if name in sys.modules))
+"""
+
+#: What a picture needs none of: other formats, reports, the window, and the setting up of numba's compiler.
+UNNEEDED = ("PIL", "trimesh", "rich", "mpmath", "PySide6", "pyqtgraph", "OpenEXR", "difflib", "subprocess", "rtcore.files.nff",
+            "rtcore.algebra.crossings", "rtcore.reports", "rtcore.solvers", "numba.cpython.cmathimpl")
+
+
+def python(code: str, **env: str) -> str:
+    run = subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(ROOT), **env}, cwd=ROOT, capture_output=True,
+                         text=True, timeout=280)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
+def test_importing_compiles_nothing(tmp_path):
+    assert python(EVERYTHING, RAYSCOPE_CACHE=str(tmp_path)).split() == ["True", "0", "0"]
+    assert not any(path.is_file() for path in tmp_path.rglob("*"))
+
+
+def test_importing_takes_little_more_than_numba(tmp_path):
+    """As installed: bytecode is there. In parts of what numpy and numba take, 0.3 s where 0.2 s more are allowed."""
+    env = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
+    python(SECONDS, **env)
+    runs = [tuple(map(float, python(SECONDS, **env).split())) for _ in range(3)]
+    assert min(ours for _, ours in runs) < 2 / 3 * min(base for base, _ in runs), runs
+
+
+def test_a_render_imports_and_loads_only_what_it_needs(tmp_path):
+    code = RENDER.format(scene=str(FIRST_SCENE), out=str(tmp_path / "a.png"), names=UNNEEDED)
+    python(code)        # once, in case kernels have to be compiled
+    exit_code, kernels, *imported = python(code).split()
+    assert exit_code == "0" and imported == []
+    assert int(kernels) == 15       # 5 for any picture, 2 for its light, 3 for lights, 1 for bounces, 2 for each of two kinds
+
+
+@pytest.mark.parametrize("name", ["crossings", "render", "Sphere"])
+def test_names_of_the_package_are_there_when_asked_for(name):
+    assert python(f"import rtcore; print(callable(rtcore.{name}), {name!r} in rtcore.__all__)").split() == ["True", "True"]
+    assert python(f"from rtcore import *; print(callable({name}))").split() == ["True"]
+
+
+def test_a_wrong_name_is_an_attribute_error():
+    assert python("import rtcore\ntry:\n rtcore.banana\nexcept AttributeError as e: print(e)").startswith("module 'rtcore' has no attribute")
