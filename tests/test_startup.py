@@ -76,4 +76,5 @@ def test_names_of_the_package_are_there_when_asked_for(name):
 
 
 def test_a_wrong_name_is_an_attribute_error():
-    assert python("import rtcore\ntry:\n rtcore.banana\nexcept AttributeError as e: print(e)").startswith("module 'rtcore' has no attribute")
+    said = python("import rtcore\ntry:\n rtcore.banana\nexcept AttributeError as e: print(e)")
+    assert said.startswith("module 'rtcore' has no attribute")
