@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.plots import PRINTED, Figure, Style, apart, save, write
 
-SLOPES = ((-0.5, "t⁻¹ᐟ²"), (-0.75, "t⁻³ᐟ⁴"))        # of independent samples, and of stratified ones at edges
+SLOPES = ((-0.5, "slope −½"), (-0.75, "slope −¾"))        # of independent samples, and of stratified ones at edges
 
 
 class Curve(NamedTuple):
@@ -34,8 +34,8 @@ class ErrorFigure(Figure):
     """Error against seconds, both logarithmic: solid the true error, dashed the estimate, and two faint lines to compare slopes with."""
 
     def __init__(self, style: Style, title: str = "Error against time",
-                 reading: str = "Solid: the error against the reference; dashed: the render's own estimate. Grey: slopes to compare with."):
-        super().__init__(title, reading if style.titled else "", style)
+                 reading: str = "Solid: the error against a reference; dashed: the render's own estimate. Dotted: slopes to compare with."):
+        super().__init__(title, reading, style)
         self.plot = self.panel(0, "", "seconds", "root mean square error")
 
     def show_curves(self, curves: list[Curve]):
