@@ -7,6 +7,7 @@ from PySide6.QtCore import QByteArray, QSettings
 from app.actions import ACTIONS, MENUS, TOOLBAR
 from app.entry import number_text, parsed, step_of
 from app.gui import missing_packages
+from app.panels import PANELS
 from app.settings import Preferences
 from app.status import elapsed_text
 from app.window import Window
@@ -41,7 +42,7 @@ def test_a_layout_that_is_no_layout_does_not_matter(qtbot, session, preferences)
     preferences.layout = QByteArray(b"not a geometry"), QByteArray(b"nor a state")
     window = Window(session, preferences)
     window.show()
-    assert [name for name, dock in window.docks.items() if dock.isHidden()] == ["Stability"]
+    assert [name for name, dock in window.docks.items() if dock.isHidden()] == [panel.title for panel in PANELS if panel.area == "bottom"]
     window.close()
     window.deleteLater()
 
