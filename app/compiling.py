@@ -1,5 +1,6 @@
 """Kernels compiled ahead in helper processes, one per core, so that the window goes on answering while LLVM works."""
 import contextlib
+import itertools
 import os
 import subprocess
 import sys
@@ -40,20 +41,22 @@ class Compiler:
         self._killed = False
 
     def compile(self, names: list[str], progress: Callable[[Compiling], None]) -> str:
-        """Compile these kernels into the cache, the longest first, each helper taking the next one as soon as it is free. `progress` is
-        called by one thread at a time. Returns an empty string, or in one line why a helper failed."""
+        """Compile these kernels into the cache, each helper taking the next one as soon as it is free, from one end of the queue or the
+        other. `progress` is called by one thread at a time. Returns an empty string, or in one line why a helper failed."""
         from rtcore.progressive import cores
-        from rtcore.warm import longest_first
-        todo, working, lock = deque(longest_first(names)), [], threading.Lock()
+        from rtcore.warm import queue, worth_sharing
+        todo, working, lock = deque(queue(names)), [], threading.Lock()
 
-        def follow(process: subprocess.Popen) -> str:
+        def follow(process: subprocess.Popen, front: bool) -> str:
             """Give a helper one kernel after another; why it failed, if it did."""
             name = None
             while True:
                 with lock:
                     if name is not None:
                         working.remove(name)
-                    name = todo.popleft() if todo else None
+                    name = None
+                    if todo and (front or worth_sharing(todo)):
+                        name = todo.popleft() if front else todo.pop()
                     if name is not None:
                         working.append(name)
                     if working:
@@ -68,7 +71,7 @@ class Compiler:
         try:
             self._processes = [self._start() for _ in range(min(self._count or cores(), len(names)))]
             with ThreadPoolExecutor(len(self._processes), "compiling") as pool:
-                complaints = list(pool.map(follow, self._processes))
+                complaints = list(pool.map(follow, self._processes, itertools.cycle((True, False))))
         except OSError as error:
             complaints = [str(error)]
         finally:

@@ -131,12 +131,28 @@ def missing(scene: Scene, settings: Settings, screen: bool = False) -> list[str]
 
 #: Seconds that compiling takes, by group, where it is long.
 SLOW = {"implicit": 33, "blob": 30, "cone": 20, "torus": 17, "quadric": 10, "sphere": 9, "open-quadric": 8, "ellipsoid": 7, "core": 7,
-        "tree": 5, "triangle": 4, "plane": 3, "box": 2}
+        "tree": 5, "triangle": 4, "plane": 3, "samples": 2, "box": 2, "glow": 2}
 
 
-def longest_first(names: Iterable[str]) -> list[str]:
-    """Groups in the order in which helpers that work side by side are done soonest; the default precision before the other."""
-    return sorted(names, key=lambda name: (name.endswith(".f32"), -SLOW.get(name.partition(".")[0], 0)))
+#: Seconds for the code that kinds of shapes share, which every helper that compiles one has to compile first.
+SHARED = 8
+SHAPES = {kind.name for kind in KINDS}
+
+
+def queue(names: Iterable[str]) -> list[str]:
+    """Groups in an order for several helpers, of which every other takes from the end: kinds of shapes in front, the longest first;
+    everything else behind, the longest last; the default precision before the other."""
+    def place(name: str) -> tuple:
+        group, precision = name.split(".")
+        seconds = SLOW.get(group, 0)
+        return (0, precision == "f32", -seconds) if group in SHAPES else (1, precision != "f32", seconds)
+    return sorted(names, key=place)
+
+
+def worth_sharing(names: Iterable[str]) -> bool:
+    """Whether a helper that takes from the end should go on with what is left, or leave a few kinds of shapes to the others."""
+    groups = [name.partition(".")[0] for name in names]
+    return not SHAPES.issuperset(groups) or sum(SLOW.get(group, 1) for group in groups) > SHARED
 
 
 def compile_kernels(names: Iterable[str], progress: Callable[[int, int, str], None] = lambda done, total, name: None) -> None:

@@ -12,6 +12,7 @@ from app.engine import Job
 from app.options import Options
 from app.outline import trace_outline
 from app.worker import Worker
+from rtcore.warm import queue, worth_sharing
 
 
 @pytest.fixture
@@ -126,15 +127,24 @@ def test_missing_kernels_are_compiled_by_a_helper_first(start, qtbot, scene):
     assert worker.compiling is None and seen[-2:] != [None, None] and "plane" in "".join(filter(None, seen))
 
 
-def test_helpers_share_the_kernels_longest_first():
+def test_helpers_share_the_kernels_from_both_ends():
+    names = ["fog.f64", "torus.f32", "core.f64", "torus.f64", "sphere.f64", "core.f32", "lit.f64"]
+    assert queue(names) == ["torus.f64", "sphere.f64", "torus.f32", "core.f32", "fog.f64", "lit.f64", "core.f64"]
     seen = []
-    names = ["fog.f64", "torus.f32", "core.f64", "torus.f64", "lit.f64"]
     assert Compiler((sys.executable, "-u", "-c", HELPER), processes=2).compile(names, seen.append) == ""
-    assert seen[0] == (0, 5, ("torus.f64",)) and seen[1].names == ("torus.f64", "core.f64")
+    assert set(seen[1].names) == {"torus.f64", "core.f64"}
     assert sorted({name for state in seen for name in state.names}) == sorted(names)
     assert max(len(state.names) for state in seen) == 2
     done = [state.done for state in seen]
-    assert done == sorted(done) and done[-1] == 4
+    assert done == sorted(done) and done[-1] == 6
+
+
+def test_a_quick_shape_is_left_to_the_helper_that_has_what_shapes_share():
+    assert worth_sharing(["polygon.f64", "fog.f64"]) and worth_sharing(["torus.f64"]) and not worth_sharing(["polygon.f64", "plane.f64"])
+    slow = "import sys, time\nfor name in sys.stdin: time.sleep(0.3 * ('sphere' in name)); print(name, end='', flush=True)\n"
+    seen = []
+    assert Compiler((sys.executable, "-u", "-c", slow), processes=2).compile(["sphere.f64", "polygon.f64", "lit.f64"], seen.append) == ""
+    assert not [state for state in seen if set(state.names) == {"sphere.f64", "polygon.f64"}]
 
 
 def test_one_helper_of_two_that_dies_is_told_and_ends_the_work():
@@ -156,7 +166,7 @@ def test_a_helper_that_fails_is_told_and_the_picture_comes_all_the_same(start, q
 
 def test_closing_kills_the_helper_within_a_second(qapp, qtbot, scene):
     helper = Compiler((sys.executable, "-c", "import time; time.sleep(60)"))
-    worker = Worker(renderer_factory=lambda: Double(names=["sphere"]), compiler=helper)
+    worker = Worker(renderer_factory=lambda: Double(names=["sphere.f64"]), compiler=helper)
     worker.submit(job(scene))
     qtbot.waitUntil(lambda: len(worker._compiler._processes) == 1, timeout=5000)
     began = time.monotonic()
