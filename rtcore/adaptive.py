@@ -107,7 +107,7 @@ def refinement(film: Film, width: int, height: int, order: np.ndarray, budget: f
     wanted = _share(np.floor(wish * BINS).astype(np.int64), level, left)
     last = np.zeros(len(film.count), np.int32)
     last[open_] = np.where(wanted > level, 1 << wanted, 0)
-    chosen = order[last[order] > film.count[order]]
+    chosen = order[(last > film.count)[order]]
     if len(chosen) == 0:
         return None
     return Pass(1, False, range(0), np.stack([chosen, film.count[chosen], last[chosen]], axis=1).astype(np.int32))

@@ -146,7 +146,10 @@ class Render:
         """The estimated root mean square error, over pixels and channels; None below two samples."""
         if self.plan.samples < 2:
             return None
-        return adaptive.rmse_estimate(self.film, *self.settings.size) if self.adaptive else films.rmse_estimate(self.film)
+        if self.samples < 2:
+            return None
+        uneven = self.adaptive and self.samples >= adaptive.FIRST
+        return adaptive.rmse_estimate(self.film, *self.settings.size) if uneven else films.rmse_estimate(self.film)
 
     def goes_on(self) -> bool:
         """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
