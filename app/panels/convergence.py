@@ -15,7 +15,6 @@ from rtcore.files import FileError, write_file
 
 EVERY = 150         # ms at least between two drawings
 SAMPLES = (256, 1024, 4096)
-BELOW = 1.0         # times the reference's own error, below which it can't judge
 
 
 class ConvergencePanel(Panel):
@@ -119,7 +118,7 @@ class ConvergencePanel(Panel):
             return
 
         def known(error: float):
-            if error >= BELOW * reference.error:
+            if reference.judges(error):
                 run.add(point._replace(error=error))
                 self._changed()
         self.session.tasks.run(lambda: reference.rmse(frame.pixels), known, name="true error")

@@ -25,7 +25,6 @@ METHODS = {"uniform": {"adaptive": False}, "adaptive": {"adaptive": True}, "f32"
 RUNS = 2                # of each method, with seeds of their own
 PARTS = 4               # renders that the reference is the mean of
 REFERENCE_SEED = 0x5EED_0000
-BELOW = 2.0             # rows are kept while their error is at least so many times that of the reference
 DARK = 1e-2             # added to the squared reference in relmse, lest black pixels count for all
 
 
@@ -51,6 +50,10 @@ class Reference(NamedTuple):
     def rmse(self, pixels: np.ndarray) -> float:
         """Root mean square error of another picture: of the difference, less what is the reference's own share."""
         return math.sqrt(max(float(np.square(pixels - self.pixels).mean()) - self.error ** 2, 0.0))
+
+    def judges(self, error: float) -> bool:
+        """Whether another picture's error can be told: it is not below that of the reference."""
+        return error >= self.error
 
     def relmse(self, pixels: np.ndarray) -> float:
         """Mean squared relative error of another picture."""
@@ -115,7 +118,7 @@ def run(scene: Scene, camera: Camera, settings: Settings, methods: Iterable[str]
             for frame in renderer.frames(RenderRequest(scene, camera, chosen), cancelled, coarse=False):
                 yield Step(0.5 + (done + min(frame.elapsed / chosen.seconds, 1.0)) / len(jobs) / 2, name)
                 if (row := compare(name, number, frame, reference)) is not None:
-                    if row.rmse < BELOW * reference.error:
+                    if not reference.judges(row.rmse):
                         break
                     rows[frame.number] = row
             yield Step(0.5 + (done + 1) / len(jobs) / 2, name, tuple(rows.values()))

@@ -48,8 +48,8 @@ def page(rows, reference, title: str, note: str = "") -> str:
         lines += [note, ""]
     height, width = reference.pixels.shape[:2]
     lines += [f"{width} x {height} pixels. The reference has {reference.samples} samples per pixel in several renders with seeds of their "
-              f"own; its estimated error, {reference.error:.2g}, is taken out of every rmse, and rows end where it would show. Errors are "
-              "root mean squares over pixels and channels, in linear light.", ""]
+              f"own; its estimated error, {reference.error:.2g}, is taken out of every rmse, and rows end where they are as good. Errors "
+              "are root mean squares over pixels and channels, in linear light.", ""]
     by_run: dict[tuple[str, int], list] = {}
     for row in rows:
         by_run.setdefault((row.method, row.run), []).append(row)

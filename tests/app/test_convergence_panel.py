@@ -143,7 +143,7 @@ def test_a_reference_tells_the_true_error(panel, session, double, renders, qtbot
 
 
 def test_a_reference_does_not_judge_what_is_as_good_as_itself(panel, session, renders, qtbot):
-    renders.error = 0.015
+    renders.error = 0.021
     with qtbot.waitSignal(panel.referring.ended, timeout=5000):
         panel.refer.click()
     play(session, FALLING, value=0.02)
