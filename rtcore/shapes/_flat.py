@@ -26,20 +26,21 @@ def exact_plane(matrix: np.ndarray, point, normal) -> list[float]:
 
 @inline
 def approach(ray, i, exact, q):
-    """Where eight rays reach plane q, plainly, and those that may do so within their interval."""
+    """Where eight rays reach plane q, plainly, what that may be off, and those that may do so within their interval."""
     down, d, normal = splat3(exact, q, POINT) - wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, NORMAL)
     height, speed = dot(normal, down), dot(normal, d)
     t = height / speed
     # no number of the normal is above 1; the point is known to a rounding, also where it is far away
     slack = 2.0 ** -20 * size(t) + 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT))) / size(speed)
+    off = 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT)) + extent(d) * size(t)) / size(speed)
     start, end = wide(load(ray, START, i)), until(ray, i)
-    return t, (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
+    return t, off, (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
 
 
 @inline
-def meet(ray, i, exact, q, todo, side):
-    """Where the lanes `todo` reach plane q: t in the rays' precision, the lanes that do, those for which this is not certain."""
-    o, d, start, end = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), load(ray, START, i), load(ray, T, i)
+def height_and_speed(ray, i, exact, q):
+    """How far below plane q eight rays start, and how fast they rise, as two pairs."""
+    o, d = wide(load3(ray, OX, i)), wide(load3(ray, DX, i))
     p, p1, n, n1 = splat3(exact, q, POINT), splat3(exact, q, POINT + 3), splat3(exact, q, NORMAL), splat3(exact, q, NORMAL + 3)
     x, x1 = fall(o.x, p.x, p1.x, n.x, n1.x)
     y, y1 = fall(o.y, p.y, p1.y, n.y, n1.y)
@@ -51,9 +52,17 @@ def meet(ray, i, exact, q, todo, side):
     z, z1 = scale(n.z, n1.z, d.z)
     v, v1 = add(x, x1, y, y1)
     v, v1 = add(v, v1, z, z1)
+    return h, h1, v, v1
+
+
+@inline
+def meet(ray, i, exact, q, todo, side):
+    """Where the lanes `todo` reach plane q: t in the rays' precision, the lanes that do, those for which this is not certain."""
+    o, d, start, end = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), load(ray, START, i), load(ray, T, i)
+    h, h1, v, v1 = height_and_speed(ray, i, exact, q)
     t, _ = divide(h, h1, v, v1)
     blur = 32 * U64 * U64
-    reach = blur * (extent(o) + extent(p))
+    reach = blur * (extent(o) + extent(splat3(exact, q, POINT)))
     turn = blur * extent(d)
     falls = size(v) > turn
     off = (reach + turn * size(t)) / (size(v) - turn)

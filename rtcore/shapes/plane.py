@@ -34,7 +34,7 @@ class Plane(Shape, frozen=True):
 def intersect(rays, n, tree, table, first, opacity):
     for q in range(table.data.shape[0]):
         for i in range(0, n, 8):
-            _, todo = approach(rays.ray, i, table.exact, q)
+            _, _, todo = approach(rays.ray, i, table.exact, q)
             if any_lane(todo):
                 t, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
                 record(rays, i, first + q, t, hit, opacity)

@@ -1,21 +1,26 @@
-"""Polygon: the plane's hit, then the crossing rule with half-open edges in the two axes that the normal points at least."""
+"""Polygon: the plane's hit, then the crossing rule with half-open edges in the two axes that the normal points at least; in double-double
+for rays that pass an edge by less than plain float64 may be off.
+"""
 from fractions import Fraction
 from typing import Annotated
 
 import numpy as np
 
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
-from rtcore.exact import moved, rationals
+from rtcore.exact import moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, bits, load, wide
+from rtcore.lanes import any_lane, bits, load, size, wide
+from rtcore.pairs import add, divide, multiply, scale, subtract, two_sum
 from rtcore.scene import Shape, invertible
-from rtcore.shapes._ball import lowest
-from rtcore.shapes._flat import NORMAL, approach, exact_plane, meet, settle
+from rtcore.shapes._ball import U64, lowest
+from rtcore.shapes._flat import NORMAL, POINT, approach, exact_plane, height_and_speed, meet, settle
 from rtcore.shapes.kind import Kind, Packed, put_flat
 from rtcore.wave import DX, OX, record
 
 FLAT, DROP, FIRST, COUNT = 3, 6, 7, 8       # columns after the middle: normal, axis to drop, where the outline begins, its length
+#: Columns of Table.extra after the corner: the corner seen from the middle as rounded to floats, as pairs, so that short numbers are exact.
+SEEN, SEEN_REST = 3, 6
 
 
 class Polygon(Shape, frozen=True):
@@ -49,7 +54,8 @@ class Polygon(Shape, frozen=True):
         exact = np.array(exact_plane(matrix, middle, exact_newell(corners)))
         normal = exact[NORMAL:NORMAL + 3] / np.linalg.norm(exact[NORMAL:NORMAL + 3])
         row = [*exact[:3], *normal, float(np.abs(normal).argmax()), 0.0, len(points)]
-        return Packed(POLYGON, np.array([row]), points, exact=exact[None])
+        seen = [parts(x - m for x, m in zip(moved(matrix, corner), rationals(exact[POINT:POINT + 3]))) for corner in corners]
+        return Packed(POLYGON, np.array([row]), np.concatenate([points, seen], axis=1), exact=exact[None])
 
 
 def newell(points: np.ndarray) -> np.ndarray:
@@ -66,20 +72,66 @@ def exact_newell(points) -> list[Fraction]:
 
 
 @inline
-def in_outline(ray, i, extra, first, count, a, b, t):
-    """Lanes whose point at t is inside the outline extra[first .. first + count - 1], in the axes a and b."""
+def in_outline(ray, i, extra, first, count, a, b, t, off):
+    """Lanes whose point at t is inside the outline extra[first .. first + count - 1], in the axes a and b; and those that pass an edge, or
+    the height of a corner, by less than this may be wrong about, t being off by `off` at most."""
     # all seen from the ray's origin, so that a scene far from the world's keeps its digits
     ox, oy = wide(load(ray, OX + a, i)), wide(load(ray, OX + b, i))
-    x, y = t * wide(load(ray, DX + a, i)), t * wide(load(ray, DX + b, i))
+    u, v = wide(load(ray, DX + a, i)), wide(load(ray, DX + b, i))
+    x, y = t * u, t * v
+    blur_x = off * size(u) + 8 * U64 * (size(ox) + size(x))
+    blur_y = off * size(v) + 8 * U64 * (size(oy) + size(y))
     inside = t < t     # no lane
-    previous = first + count - 1
+    near, previous = ~(off < np.inf), first + count - 1
     for k in range(first, first + count):
         x0, y0, x1, y1 = extra[previous, a], extra[previous, b], extra[k, a], extra[k, b]
         # written from the lower end up, so that two polygons sharing an edge decide alike whichever way each runs it
         if y0 > y1:
             x0, y0, x1, y1 = x1, y1, x0, y0
-        low = y0 - oy
-        inside = inside ^ ((y >= low) & (y < y1 - oy) & ((x - (x0 - ox)) * (y1 - y0) < (y - low) * (x1 - x0)))
+        low, wx, wy = y0 - oy, x1 - x0, y1 - y0
+        across, up = x - (x0 - ox), y - low
+        inside = inside ^ ((up >= 0) & (y < y1 - oy) & (across * wy < up * wx))
+        most_x, most_y = blur_x + 8 * U64 * (abs(x0) + abs(x1)), blur_y + 8 * U64 * (abs(y0) + abs(y1))
+        beside = size(across * wy - up * wx) <= 2 * (most_x * wy + most_y * abs(wx) + most_x * most_y)
+        beside = beside & (up >= -most_y) & (y - (y1 - oy) <= most_y)
+        near = near | beside | (size(up) <= most_y) | (size(y - (y1 - oy)) <= most_y)
+        previous = k
+    return inside, near
+
+
+@inline
+def seen_from_middle(ray, i, exact, q, axis, t, t1):
+    """The axis's part of the points at the pair t of eight rays, as a pair, seen from the rounded middle of polygon q."""
+    x, e = two_sum(wide(load(ray, OX + axis, i)), -exact[q, POINT + axis])
+    p, p1 = scale(t, t1, wide(load(ray, DX + axis, i)))
+    return add(x, e, p, p1)
+
+
+@inline
+def in_outline_closely(ray, i, exact, q, extra, first, count, a, b):
+    """Lanes whose point on the plane of polygon q is inside its outline, in double-double."""
+    h, h1, v, v1 = height_and_speed(ray, i, exact, q)
+    t, t1 = divide(h, h1, v, v1)
+    x, e = seen_from_middle(ray, i, exact, q, a, t, t1)
+    y, f = seen_from_middle(ray, i, exact, q, b, t, t1)
+    inside, zero = t < t, 0 * t
+    previous = first + count - 1
+    for k in range(first, first + count):
+        low, high = previous, k
+        if extra[low, SEEN + b] > extra[high, SEEN + b] or (extra[low, SEEN + b] == extra[high, SEEN + b]
+                                                            and extra[low, SEEN_REST + b] > extra[high, SEEN_REST + b]):
+            low, high = high, low
+        x0, e0, y0, f0 = extra[low, SEEN + a], extra[low, SEEN_REST + a], extra[low, SEEN + b], extra[low, SEEN_REST + b]
+        x1, e1, y1, f1 = extra[high, SEEN + a], extra[high, SEEN_REST + a], extra[high, SEEN + b], extra[high, SEEN_REST + b]
+        wx, wx1 = subtract(zero + x1, zero + e1, zero + x0, zero + e0)
+        wy, wy1 = subtract(zero + y1, zero + f1, zero + y0, zero + f0)
+        across, across1 = subtract(x, e, zero + x0, zero + e0)
+        up, up1 = subtract(y, f, zero + y0, zero + f0)
+        over, _ = subtract(y, f, zero + y1, zero + f1)
+        p, p1 = multiply(across, across1, wy, wy1)
+        r, r1 = multiply(up, up1, wx, wx1)
+        left, _ = subtract(p, p1, r, r1)
+        inside = inside ^ ((up >= 0) & (over < 0) & (left < 0))
         previous = k
     return inside
 
@@ -96,9 +148,14 @@ def intersect(rays, n, tree, table, first, opacity):
                 for g in range(PACKET // 8):
                     if (walk.state[ACTIVE] >> g) & 1:
                         i = start + g * 8
-                        t, todo = approach(rays.ray, i, table.exact, q)
+                        a, b = (drop + 1) % 3, (drop + 2) % 3
+                        t, off, todo = approach(rays.ray, i, table.exact, q)
                         if any_lane(todo):
-                            todo = todo & in_outline(rays.ray, i, table.extra, begins, count, (drop + 1) % 3, (drop + 2) % 3, t)
+                            inside, near = in_outline(rays.ray, i, table.extra, begins, count, a, b, t, off)
+                            if any_lane(todo & near):
+                                closely = in_outline_closely(rays.ray, i, table.exact, q, table.extra, begins, count, a, b)
+                                inside = inside & ~near | closely & near
+                            todo = todo & inside
                         if any_lane(todo):
                             s, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
                             record(rays, i, first + q, s, hit, opacity)
@@ -120,7 +177,7 @@ def surface(rays, n, out, table, first):
 
 
 def _bounds(data, extra):
-    spans = [extra[int(f):int(f) + int(c)] for f, c in data[:, FIRST:COUNT + 1]]
+    spans = [extra[int(f):int(f) + int(c), :3] for f, c in data[:, FIRST:COUNT + 1]]
     low, high = np.array([s.min(0) for s in spans]), np.array([s.max(0) for s in spans])
     # the hit is on the plane, beside the outline by what that is not flat or was rounded: along the axis dropped, at most √3 times that
     beside = [np.abs((s - row[:3]) @ row[FLAT:FLAT + 3]).max() for s, row in zip(spans, data)]
