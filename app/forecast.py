@@ -5,11 +5,15 @@ LEAST = 0.05        # seconds between two points that a speed is taken from
 KEPT = 6            # speeds that are believed
 
 
+SLOPES = -0.5, -1.0     # between which the error falls with time, to what powers of it
+
+
 class Point(NamedTuple):
-    """How far a picture was, in samples per pixel, after so many seconds."""
+    """How far a picture was, in samples per pixel and estimated error, after so many seconds."""
 
     seconds: float
     samples: float
+    error: float | None
 
 
 class Forecast:
@@ -19,22 +23,31 @@ class Forecast:
     def __init__(self):
         self._points: list[Point] = []
 
-    def note(self, seconds: float, samples: float):
+    def note(self, seconds: float, samples: float, error: float | None = None):
         """The picture has come so far; it is another picture if that is less than before."""
         last = self._points[-1] if self._points else None
         if last is not None and (seconds < last.seconds or samples < last.samples):
             self._points, last = [], None
         if last is None or seconds - last.seconds >= LEAST:
-            self._points = [*self._points[-KEPT:], Point(seconds, samples)]
+            self._points = [*self._points[-KEPT:], Point(seconds, samples, error)]
 
-    def left(self, samples: float) -> tuple[float, float] | None:
-        """Seconds until there are so many samples per pixel, at the least and at the most; None as long as nothing can be said."""
+    def left(self, samples: float, seconds: float | None = None, error: float | None = None) -> tuple[float, float] | None:
+        """Seconds until there are so many samples per pixel, or so many seconds are over, or the error is so low, whichever is first: at
+        the least and at the most. None as long as nothing can be said."""
         paces = [(b.samples - a.samples) / (b.seconds - a.seconds) for a, b in zip(self._points, self._points[1:])]
         paces = [pace for pace in paces if pace > 0]
         if not paces:
             return None
-        rest = max(samples - self._points[-1].samples, 0.0)
-        return rest / max(paces), rest / min(paces)
+        now = self._points[-1]
+        rest = max(samples - now.samples, 0.0)
+        ends = [(rest / max(paces), rest / min(paces))]
+        if seconds is not None:
+            ends.append((max(seconds - now.seconds, 0.0),) * 2)
+        if error is not None and now.error is not None:
+            factor = max(now.error / error, 1.0)
+            late, early = (now.seconds * (factor ** (-1 / slope) - 1) for slope in SLOPES)
+            ends.append((early, late))
+        return min(end[0] for end in ends), min(end[1] for end in ends)
 
 
 def left_text(left: tuple[float, float] | None) -> str:

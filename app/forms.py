@@ -115,7 +115,7 @@ class RecordForm(Form):
         fields = fields_of(type(record))
         for name in only or fields:
             field = fields[name]
-            if name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color)):
+            if name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color) and name not in (editors or {})):
                 continue
             value = getattr(record, name)
             editor = (editors or {}).get(name) or editor_for(field, value)

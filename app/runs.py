@@ -12,6 +12,7 @@ from rtcore.scene import Scene
 WORDS = {"adaptive": ("adaptive", "uniform"), "shadows": ("shadows", "no shadows"), "fog": ("fog", "no fog"),
          "reflections": ("reflections", "no reflections")}
 NUMBERS = {"samples": "samples", "max_depth": "rays deep", "threads": "threads", "seed": "seed"}
+LIMITS = {"seconds": "{} s", "error": "to error {}"}
 SILENT = ("view", "scale")      # another view of the same run; the scale shows in the size
 
 
@@ -70,6 +71,9 @@ def _words(job: Job) -> dict[str, str]:
     """All that can be told of a job, by field."""
     told = {"scene": job.scene.name or "a scene", "size": "{} × {}".format(*job.size)}
     for name, value in _options(job).items():
+        if name in LIMITS:
+            told[name] = LIMITS[name].format("any" if value is None else f"{value:g}")
+            continue
         told[name] = WORDS[name][not value] if name in WORDS else f"{value} {NUMBERS[name]}" if name in NUMBERS else str(value)
     return told
 

@@ -12,7 +12,7 @@ PARTS = (("pass", "converged, samples 65536/65536", "How far it is: the lattice 
          ("speed", "9,999.9 Mrays/s", "Rays traced in a second, in millions: primary, shadow, reflected and refracted ones"),
          ("elapsed", "99:59:59.9", "How long this picture has been traced"),
          ("error", "error 0.000012", "Estimated root mean square error, in linear light where white is 1; blind to what no sample met"),
-         ("left", "100 to 100 min left", "Time until all samples are traced, from the fastest and the slowest of the latest paces"),
+         ("left", "100 to 100 min left", "Time until it stops, from the fastest and the slowest of the latest paces"),
          ("pixel", "99999, 99999", "The pixel under the cursor, counted from the top left"),
          ("distance", "at 1.23456e+10", "How far from the eye that is which the cursor points at, in scene units"))
 
@@ -79,13 +79,14 @@ class Status(QStatusBar):
     @Slot()
     def _frame(self):
         shown = self._session.shown
-        frame, samples = shown.frame, int(shown.job.options.samples)
-        self._forecast.note(frame.elapsed, frame.mean)
+        frame, options = shown.frame, shown.job.options
+        samples = int(options.samples)
+        self._forecast.note(frame.elapsed, frame.mean, frame.error)
         self.parts["pass"].setText(pass_text(frame, samples))
         self.parts["speed"].setText(speed_text(frame))
         self.parts["elapsed"].setText(elapsed_text(frame.elapsed))
         self.parts["error"].setText(error_text(frame.error))
-        self.parts["left"].setText("" if frame.done else left_text(self._forecast.left(samples)))
+        self.parts["left"].setText("" if frame.done else left_text(self._forecast.left(samples, options.seconds, options.error)))
 
     @Slot()
     def _hover(self):

@@ -4,7 +4,7 @@ import os
 from PySide6.QtCore import Slot
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app.editors import GridEdit, SliderEdit
+from app.editors import GridEdit, MaybeEdit, SliderEdit
 from app.forms import RecordForm
 from app.options import Options
 from app.panels.base import Panel
@@ -24,6 +24,7 @@ class RenderPanel(Panel):
         editors["samples"] = SliderEdit(1, 1024, log=True, whole=True)
         editors["max_depth"] = SliderEdit(1, 16, whole=True)
         editors["threads"] = SliderEdit(0, os.cpu_count() or 1, whole=True)
+        editors["seconds"], editors["error"] = MaybeEdit(GridEdit(), 10.0), MaybeEdit(GridEdit(), 0.002)
         editors["scale"] = SliderEdit(0.25, 2)
         self.form = RecordForm(lambda: session.options, self._commit, session.seal, skip=("shadows", "fog", "reflections"), editors=editors)
         self.column.addWidget(self.form)

@@ -205,3 +205,20 @@ def test_an_edit_leaves_the_tree_open(window, session):
     session.edit_record(Place("node", (2, 0)), msgspec.structs.replace(node_at(session.scene, (2, 0)), visible=False), "hide")
     assert tree.view.isExpanded(tree.model.find(Place("node", (2,)))) and not model_resets
     assert tree.model.data(tree.model.find(Place("node", (2, 0))), Qt.ItemDataRole.CheckStateRole) == Qt.CheckState.Unchecked
+
+
+def test_when_to_stop_is_asked_of_the_renderer(window, session, double, qtbot, settled):
+    form = window.panels["Render"].form
+    for name, text in (("seconds", "3.5"), ("error", "0.01")):
+        editor = form.editors[name]
+        assert getattr(session.options, name) is None and not editor.box.isChecked()
+        qtbot.mouseClick(editor.box, Qt.MouseButton.LeftButton)
+        assert getattr(session.options, name) == {"seconds": 10.0, "error": 0.002}[name]
+        type_into(qtbot, editor.findChild(QLineEdit), text)
+        assert getattr(session.options, name) == float(text)
+    type_into(qtbot, form.editors["error"].findChild(QLineEdit), "0", end=None)
+    assert session.options.error == 0.01
+    settled(session)
+    assert double.jobs[-1].options.settings()["seconds"] == 3.5
+    qtbot.mouseClick(form.editors["seconds"].box, Qt.MouseButton.LeftButton)
+    assert session.options.seconds is None

@@ -44,6 +44,10 @@ def test_the_forecast_is_an_interval_of_paces():
     for seconds, samples in ((1.0, 4.0), (2.0, 8.0), (4.0, 10.0)):      # 4 a second, then 1
         forecast.note(seconds, samples)
     assert forecast.left(16) == pytest.approx((1.5, 6.0)) and forecast.left(5) == (0, 0)
+    assert forecast.left(16, seconds=7.0) == pytest.approx((1.5, 3.0)) and forecast.left(16, seconds=1.0) == (0, 0)
+    assert forecast.left(16, error=0.1) == pytest.approx((1.5, 6.0))       # nothing is known of the error yet
+    forecast.note(5.0, 11.0, 0.2)
+    assert forecast.left(1000, error=0.1) == pytest.approx((5.0, 15.0)) and forecast.left(1000, error=0.3) == (0, 0)
     forecast.note(0.1, 1.0)     # another picture
     assert forecast.left(16) is None
     forecast.note(0.11, 2.0)    # too soon to tell
