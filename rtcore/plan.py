@@ -82,7 +82,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     kinds = tuple(sorted(counts, key=lambda k: k.name))
     casting = sorted({type(light).__name__.lower() for light in lights})
     wanted = {"core": True, "glow": lit, "samples": "further samples" in stages, "doubt": any(kind in DOUBTFUL for kind in kinds),
-              "tree": any(stage.startswith("tree: ") for stage in stages), **{kind.name: True for kind in kinds},
+              "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
+              **{kind.name: True for kind in kinds},
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
               "adaptive": "further samples" in stages and (settings.adaptive or VIEW[settings.view].needs_error)}
     names = [name for name, needed in wanted.items() if needed]

@@ -67,6 +67,10 @@ def _adaptive(dtype):
     adaptive.squared_errors(films.new_film(8, 8), 8, 8)
 
 
+def _leaf(dtype):
+    bvh.build(np.zeros((1, 3)), np.ones((1, 3)), 2)
+
+
 def _tree(dtype):
     low = np.arange(24.0).reshape(8, 3)
     bvh.build(low, low + 0.1, 2)
@@ -110,7 +114,7 @@ def _kind(kind):
 #: Each group: the module whose source it hangs on, and how to compile it for a precision.
 GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
-    "screen": ("rtcore.film", _screen), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
+    "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog),
     "adaptive": ("rtcore.adaptive", _adaptive),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},

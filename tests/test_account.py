@@ -34,7 +34,7 @@ def test_shares_add_up_and_every_stage_and_kernel_has_one():
     assert [kept.stage for kept in made.kept] == list(frame.plan.stages) and [name for name, _ in made.kernels] == list(frame.plan.kernels)
     assert {kept.stage: kept.within for kept in made.kept if kept.within} == {"tree: sphere": "hits: sphere"}
     assert [kept.stage for kept in made.kept if kept.share == 0] == ["tree: sphere"]
-    assert [name for name, share in made.kernels if share == 0] == ["tree.f64"]
+    assert [name for name, share in made.kernels if share == 0] == ["leaf.f64", "tree.f64"]
     assert made.bytes == sum(frame.held.values()) > 0
 
 
