@@ -3,7 +3,7 @@ value's sign. It has no derivatives, and knows nothing where an operation may be
 """
 import numpy as np
 
-from rtcore.jit import inline, kernel, out_of_line
+from rtcore.jit import inline, inline_new, kernel, out_of_line
 from rtcore.pairs import add, divide, multiply, square_root, two_product
 from rtcore.shapes._elementary import CLOSE, angle, exponential, logarithm, sine_cosine
 from rtcore.shapes._formula import (ABS, ADD, ADD_C, ATAN2, C_DIVIDE, C_SUB, CONSTANT, COSINE, DIVIDE, DIVIDE_C, EXP, FLOOR, LOG, MAX, MIN,
@@ -15,7 +15,7 @@ LEAST = 1e-300              # of products: beside what underflows
 HIGH, REST, OFF = range(3)  # columns of a row: the pair, and what it may be off
 
 
-@inline
+@inline_new
 def new_rows():
     """What `value_of` works on."""
     return np.empty((MOST_STEPS, 3))
