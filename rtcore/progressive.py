@@ -80,6 +80,8 @@ class Render:
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
         self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
         self.schedule = passes(adaptive.FIRST if self.adaptive else self.plan.samples, coarse)
+        numbers: dict[int, int] = {}
+        self.materials = np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in geometry.leaves], np.int32)
         self.order: np.ndarray | None = None
         self.spent = 0.0        # samples per pixel of whole passes
         self.converged = False  # nothing is left that could be seen
@@ -205,7 +207,7 @@ class Render:
         films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
         view = VIEW[self.settings.view]
         error = np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
-        shown = view.draw(Seen(pixels, node, distance, normal, doubt, self.film.count.reshape(height, width), error))
+        shown = view.draw(Seen(pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width), error))
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),
                      self.converged, self.held())

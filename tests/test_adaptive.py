@@ -118,6 +118,15 @@ def test_views_show_samples_and_error():
         assert np.isfinite(rtcore.render(BALLS, SIZE, 1, view=view).pixels).all()
 
 
+def test_material_view_has_a_colour_per_material():
+    shared, own = Material(), Material(color=(1, 0, 0))
+    balls = Scene(objects=[Node(shape=Sphere((x, 0, 0), 0.4), material=m) for x, m in ((-1, shared), (0, own), (1, shared))],
+                  camera=BALLS.camera)
+    shown = render(balls, samples=1, view="material")[0][-1].pixels[36]
+    left, middle, right = shown[24], shown[48], shown[72]
+    assert (left == right).all() and (left != middle).any() and middle.any() and not shown[0].any()
+
+
 # --- the parts ---
 
 @pytest.mark.parametrize("size", [(1, 1), (64, 64), (97, 130), (200, 3)])

@@ -149,7 +149,8 @@ def test_what_is_not_certified_is_marked_counted_and_shown():
         orange = frame.pixels[:, :, 0] > 2 * frame.pixels[:, :, 2] + 0.1
         assert (orange == (frame.node >= 0)).all() if doubtful else not orange.any()
     flags = np.array([[1, 2, 0]], np.uint8)
-    shown = draw(Seen(np.zeros((1, 3, 3), np.float32), np.array([[0, -1, 0]]), None, None, flags, None, None))
+    shown = draw(Seen(**{**dict.fromkeys(Seen._fields), "pixels": np.zeros((1, 3, 3), np.float32), "node": np.array([[0, -1, 0]]),
+                         "doubt": flags}))
     assert shown[0, :, 0].tolist() == pytest.approx([0.7, 0.7, 0])
 
 

@@ -3,8 +3,9 @@ from rtcore.views.beauty import BEAUTY
 from rtcore.views.certified import CERTIFIED
 from rtcore.views.depth import DEPTH
 from rtcore.views.error import ERROR
+from rtcore.views.material import MATERIAL
 from rtcore.views.normal import NORMAL
 from rtcore.views.object import OBJECT
 from rtcore.views.samples import SAMPLES
 
-VIEWS = (BEAUTY, NORMAL, DEPTH, OBJECT, CERTIFIED, SAMPLES, ERROR)
+VIEWS = (BEAUTY, NORMAL, DEPTH, OBJECT, MATERIAL, CERTIFIED, SAMPLES, ERROR)

@@ -1,4 +1,5 @@
 """What a view is."""
+import colorsys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,6 +12,7 @@ class Seen(NamedTuple):
 
     pixels: np.ndarray          # float32 (h, w, 3): the linear picture
     node: np.ndarray            # int32 (h, w): the leaf first hit, -1 none
+    material: np.ndarray        # int32 (leaves): the number of its material
     distance: np.ndarray        # float32 (h, w): its distance from the eye, inf none
     normal: np.ndarray          # float32 (h, w, 3): its normal, 0 none
     doubt: np.ndarray           # uint8 (h, w): 1 where that hit lacks a proof
@@ -30,9 +32,15 @@ class View:
     needs_error: bool = False
 
 
+def palette(n: int) -> np.ndarray:
+    """`n` colours (n, 3), hues a golden section apart so that neighbours differ."""
+    colors = [colorsys.hsv_to_rgb(i * 0.618033988749895 % 1, 0.65, (0.85, 0.6, 1.0)[i % 3]) for i in range(n)]
+    return np.array(colors, np.float32).reshape(-1, 3)
+
+
 def heat(share: np.ndarray) -> np.ndarray:
     """Shares 0 .. 1 (h, w) as linear colours (h, w, 3) from black through violet, red and orange to pale yellow, evenly brighter to the
-    eye: a shade below 0 is black, and one above 1 is white."""
+    eye. What is above 1 is white."""
     places = np.linspace(0, 1, len(HEAT))
     colors = np.stack([np.interp(share, places, HEAT[:, k], right=1.0) for k in range(3)], axis=-1)
     return (colors ** 2.2).astype(np.float32)
