@@ -11,7 +11,7 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, parts
 from rtcore.fields import FieldError, Formula, Vec, Vector
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline, inline_new, kernel
 from rtcore.lanes import greatest, least, load, load3, rounded, select, size, store, wide
 from rtcore.pairs import add, multiply, two_product, two_sum
 from rtcore.scene import Shape, invertible
@@ -73,7 +73,7 @@ class Implicit(Shape, frozen=True):
         return Packed(IMPLICIT, np.concatenate([center - half, center + half])[None], exact=exact[None])
 
 
-@inline
+@inline_new
 def take_code(code, exact, q):
     """The tape of implicit q, as the interpreter takes it."""
     count = int(exact[q, COUNT])
