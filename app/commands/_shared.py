@@ -12,7 +12,7 @@ from app.commands._progress import Progress
 OPTIONS = {"samples": "spp", "seconds": "time", "max_depth": "max-depth"}
 
 
-BYTES_A_PIXEL = 100     # of the film, a frame made from it, and the picture as it is saved
+BYTES_A_PIXEL = 140     # of the film, a frame made from it, and the choice of further samples; 100 where one sample is all
 
 
 class Refused(Exception):
