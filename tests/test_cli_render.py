@@ -151,7 +151,7 @@ def test_a_full_disk_leaves_the_old_picture_and_is_exit_code_1(scene, run, monke
 def test_a_picture_that_memory_can_not_hold_is_refused(scene, run, monkeypatch):
     monkeypatch.setattr(_shared, "memory", lambda: 1 << 30)
     code, _, err = run("render", scene, "-o", "a.png", "--size", "16384x16384")
-    assert code == 1 and one_line(err) and "needs about 25.0 GiB of memory, and there are 1.0 GiB" in err
+    assert code == 1 and one_line(err) and "needs about 35.0 GiB of memory, and there are 1.0 GiB" in err
 
 
 def test_what_memory_there_is():
