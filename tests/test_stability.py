@@ -11,7 +11,7 @@ import pytest
 from commandline import ENVIRONMENT, one_line, process, run_here
 
 import rtcore
-from rtcore import Blob, Box, Cylinder, Implicit, Mesh, Plane, Polygon, Scale, Sphere, Torus, solvers
+from rtcore import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Scale, Sphere, Torus, solvers
 from rtcore.reports import measure, stability
 from rtcore.reports.catalogue import CATALOGUE
 from rtcore.reports.condition import FORMS, condition
@@ -46,6 +46,8 @@ def table(path):
 @pytest.mark.parametrize(("shape", "origin", "direction", "roots"), [
     (Torus(1, 0.25), (1, -5, 0.25), (0, 1, 0), [5] * 4), (Torus(1, 0.25), (-5, 0.75, 0), (1, 0, 0), [4, 5, 5, 6]),
     (Torus(1, 0.25), (-5, 0, 0), (1, 0, 0), [3.75, 4.25, 5.75, 6.25]), (Torus(1, 1), (0, 0, -5), (0, 0, 1), [5] * 4),
+    (Torus(0.8125, 0.9375), (0.4375, -0.375, 0.9375), (-0.5, -0.5, 0), [-0.75, -0.75, 0.875, 0.875]),
+    (Cone((0.25, 0, 0), 0.375, (0.5, 1, 0.25)), (1.5, 2, 0.25), (-1, -1, 0), [1, 1]),
     (Torus(1, 0.25), (0, 0, -5), (0, 0, 1), []), (Blob((((0, 0, 0), 1, 1),), 1), (-5, 0, 0), (1, 0, 0), [5, 5]),
     (Sphere((0, 0, 0), 1), (0, 1, -5), (0, 0, 1), [5, 5]), (Sphere((0, 0, 0), 1), (1, 0, 0), (0, 1, 0), [0, 0])])
 def test_multiple_roots_of_the_oracle(shape, origin, direction, roots):

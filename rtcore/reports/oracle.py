@@ -113,6 +113,11 @@ def gcd(a: list, b: list) -> list:
     return [x / a[0] for x in a]
 
 
+def power_near(x):
+    """A power of two near x, by which numbers are scaled without rounding: a double root stays one."""
+    return mp.mpf(2) ** mp.floor(mp.log(x, 2))
+
+
 # --- the shapes: (t, normal of any length) of every crossing with o + t d ---
 
 def _sphere(s: Sphere, o, d):
@@ -236,7 +241,7 @@ def _quadric(s: Quadric, o, d):
 def _torus(s: Torus, o, d):
     """The quartic's raw coefficients, all its complex roots, the real ones of them."""
     big, small = mp.mpf(s.major_radius), mp.mpf(s.minor_radius)
-    speed = mp.sqrt(dot(d, d)) / (big + small)      # so that a root that is not real can be told by its size
+    speed = power_near(mp.sqrt(dot(d, d)) / (big + small))      # so that a root that is not real can be told by its size
     d = times(1 / speed, d)
     dd, od, k = dot(d, d), dot(o, d), dot(o, o) + big ** 2 - small ** 2
     flat = [d[0] ** 2 + d[1] ** 2, 2 * (o[0] * d[0] + o[1] * d[1]), o[0] ** 2 + o[1] ** 2]
@@ -262,7 +267,7 @@ def _blob(s: Blob, o, d):
     """The ends of all elements' spheres cut the ray; between them the raw quartic's complex roots, where the field can reach at all."""
     elements = [(vector(c), mp.mpf(r), mp.mpf(w)) for c, r, w in s.elements]
     threshold, forms = mp.mpf(s.threshold), []
-    speed = mp.sqrt(dot(d, d)) / max(r for _, r, _ in elements)     # as for the torus
+    speed = power_near(mp.sqrt(dot(d, d)) / max(r for _, r, _ in elements))     # as for the torus
     d = times(1 / speed, d)
     for center, radius, strength in elements:       # 1 - |p - center|²/radius² as a t² + 2 b t + c
         f = sub(o, center)
