@@ -2,11 +2,15 @@
 import io
 import math
 import os
+import threading
+import weakref
+from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
 
+from rtcore import rows
 from rtcore.fields import FieldError
 from rtcore.film import encode
 from rtcore.flatten import Geometry, flatten
@@ -15,9 +19,10 @@ from rtcore.progressive import Renderer, RenderRequest
 from rtcore.scene import Scene
 from rtcore.settings import Settings
 from rtcore.trace import CLOSEST
-from rtcore.wave import DEAD, DX, GX, OPAQUE, OX, START, SURFACE_ROWS, T, U, Rays, new_rays
+from rtcore.wave import GX, OPAQUE, SURFACE_ROWS, U, Rays, new_rays
 
-CHUNK = 1 << 14     # rays traced in one go: their arrays stay in the second-level cache
+CHUNK = 1 << 13     # rays traced in one go: their arrays stay in the second-level cache
+KEPT = 4            # scenes and precisions whose geometry is kept for the next query
 
 
 class Image(NamedTuple):
@@ -39,14 +44,70 @@ class Image(NamedTuple):
         return buffer.getvalue()
 
 
-class Hits(NamedTuple):
+class Hits:
     """What N rays hit: t (N,), inf for nothing; node (N,), the index among `scene.leaves()`, -1 for nothing; normal (N, 3), the
-    geometric one, of length 1, on the shape's front; uv (N, 2). Where nothing is hit, normal and uv are 0."""
+    geometric one, of length 1, on the shape's front; uv (N, 2). Where nothing is hit, normal and uv are 0.
 
-    t: np.ndarray
-    node: np.ndarray
-    normal: np.ndarray
-    uv: np.ndarray
+    t and node are there at once. normal and uv are worked out when one of them is first asked for; until then the rays are kept, 64 bytes
+    each (float32: 32).
+    """
+
+    def __init__(self, t: np.ndarray, node: np.ndarray, traced: "Traced"):
+        self.t, self.node = t, node
+        self._traced, self._surface = traced, None
+
+    @property
+    def normal(self) -> np.ndarray:
+        return self._found()[0]
+
+    @property
+    def uv(self) -> np.ndarray:
+        return self._found()[1]
+
+    def _found(self) -> tuple[np.ndarray, np.ndarray]:
+        traced = self._traced       # looked at once: another thread may be doing the same
+        if traced is not None:
+            self._surface = traced.surface()
+            self._traced = None
+        return self._surface
+
+    def __iter__(self):
+        """For t, node, normal, uv = hits."""
+        return iter((self.t, self.node, self.normal, self.uv))
+
+    def __getstate__(self) -> tuple:
+        return tuple(self)
+
+    def __setstate__(self, state: tuple):
+        self.t, self.node, *surface = state
+        self._traced, self._surface = None, tuple(surface)
+
+    def __repr__(self) -> str:
+        return f"<Hits: {np.count_nonzero(self.node >= 0)} of {len(self.t)} rays>"
+
+
+class Traced(NamedTuple):
+    """Rays that were traced, chunk by chunk, and what they were traced through."""
+
+    geometry: Geometry
+    spans: list[tuple[int, int]]    # which rays each chunk holds
+    rays: list[Rays]
+    threads: int | None
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Normals (N, 3) and texture coordinates (N, 2) where they hit, 0 elsewhere."""
+        n = self.spans[-1][1] if self.spans else 0
+        normal, uv = np.empty((n, 3), self.geometry.dtype), np.empty((n, 2), self.geometry.dtype)
+
+        def look(number: int) -> None:
+            a, b = self.spans[number]
+            found = np.zeros((SURFACE_ROWS, b - a), self.geometry.dtype)
+            for group in self.geometry.groups:
+                group.kind.surface(self.rays[number], b - a, found, group.table, group.first)
+            normal[a:b], uv[a:b] = found[GX:GX + 3].T, found[U:U + 2].T
+
+        _share(look, len(self.spans), self.threads)
+        return normal, uv
 
 
 def render(scene: Scene, size: tuple[int, int] = (640, 480), spp: int = 1, **settings) -> Image:
@@ -70,101 +131,142 @@ def intersect(scene: Scene, origins, directions, t_min=0.0, t_max=math.inf, prec
     origins, directions: (N, 3); directions of any length other than 0, t counts in their lengths. t_min (of at least 0) and t_max: a
     number or (N,).
     precision "f64" or "f32", threads None for one per core. Raises FieldError for arrays of another shape or numbers that are not finite.
+
+    Fastest with arrays of the precision, rays that keep together next to one another, and one scene asked again: what was made of the
+    scenes asked last is kept as long as they live.
     """
-    rays, stretch, geometry, n = _rays(scene, origins, directions, t_min, t_max, precision)
-    surface = np.zeros((SURFACE_ROWS, rays.ray.shape[1]), geometry.dtype)
+    query = Query(scene, origins, directions, t_min, t_max, precision)
+    dtype, spans = query.geometry.dtype, query.spans
+    t, node = np.empty(query.n, dtype), np.empty(query.n, np.int32)
+    traced = [None] * len(spans)
 
-    def trace(a: int, b: int) -> None:
-        part = rays._replace(ray=np.ascontiguousarray(rays.ray[:, a:b]), prim=rays.prim[a:b], depth=rays.depth[a:b], doubt=rays.doubt[a:b])
-        for group in geometry.groups:
-            group.kind.intersect(part, b - a, group.tree, group.table, group.first, CLOSEST)
-        found = np.zeros((SURFACE_ROWS, b - a), geometry.dtype)
-        for group in geometry.groups:
-            group.kind.surface(part, b - a, found, group.table, group.first)
-        rays.ray[T, a:b], surface[:, a:b] = part.ray[T], found
+    def trace(number: int) -> None:
+        a, b = spans[number]
+        traced[number], stretch = query.rays(a, b)
+        for group in query.geometry.groups:
+            group.kind.intersect(traced[number], b - a, group.tree, group.table, group.first, CLOSEST)
+        rows.give(traced[number], stretch, query.geometry.leaf, t[a:b], node[a:b])
 
-    _share(trace, rays.ray.shape[1], threads)
-    hit = rays.prim[:n] >= 0
-    node = np.where(hit, geometry.leaf[rays.prim[:n]] if len(geometry.leaf) else -1, -1)
-    with np.errstate(over="ignore"):    # a hit beyond all numbers of the type
-        t = np.where(hit, rays.ray[T, :n] * stretch, np.inf).astype(geometry.dtype)
-    return Hits(t, node.astype(np.int32), np.ascontiguousarray(surface[GX:GX + 3, :n].T), np.ascontiguousarray(surface[U:U + 2, :n].T))
+    _share(trace, len(spans), threads)
+    return Hits(t, node, Traced(query.geometry, spans, traced, threads))
 
 
 def occluded(scene: Scene, origins, directions, t_max=math.inf, precision: str = "f64", threads: int | None = None) -> np.ndarray:
     """Whether anything at all, transparent or not, is hit at 0 < t < t_max: (N,) bool. Arguments as for `intersect`."""
-    rays, _, geometry, n = _rays(scene, origins, directions, 0.0, t_max, precision)
-    opaque = np.full(max(len(geometry.leaf), 1), OPAQUE, np.int32)
+    query = Query(scene, origins, directions, 0.0, t_max, precision)
+    opaque = np.full(max(len(query.geometry.leaf), 1), OPAQUE, np.int32)
+    result = np.empty(query.n, bool)
 
-    def trace(a: int, b: int) -> None:
-        part = rays._replace(ray=np.ascontiguousarray(rays.ray[:, a:b]), prim=rays.prim[a:b], depth=rays.depth[a:b], doubt=rays.doubt[a:b])
-        for group in geometry.groups:
-            group.kind.intersect(part, b - a, group.tree, group.table, group.first, opaque)
+    def trace(number: int) -> None:
+        a, b = query.spans[number]
+        rays, _ = query.rays(a, b)
+        for group in query.geometry.groups:
+            group.kind.intersect(rays, b - a, group.tree, group.table, group.first, opaque)
+        np.greater_equal(rays.prim[:b - a], 0, out=result[a:b])
 
-    _share(trace, rays.ray.shape[1], threads)
-    return rays.prim[:n] >= 0
+    _share(trace, len(query.spans), threads)
+    return result
 
 
-def _rays(scene, origins, directions, t_min, t_max, precision) -> tuple[Rays, np.ndarray, Geometry, int]:
-    """Checked rays; a power of two per ray by which their t is smaller than the caller's, so that no length of a direction overflows."""
-    Settings(precision=precision)
+# --- what is asked ---
+
+_geometries: OrderedDict[tuple[int, str], tuple[weakref.ref, Geometry]] = OrderedDict()     # the one asked last at the end
+_geometries_lock = threading.Lock()
+
+
+def geometry_of(scene: Scene, precision: str) -> Geometry:
+    """The scene, which can't change, flattened: kept for the next query, as long as the scene lives and is among those asked last."""
+    key = id(scene), precision
+    with _geometries_lock:
+        if key in _geometries:
+            _geometries.move_to_end(key)
+            return _geometries[key][1]
     geometry = flatten(scene, precision)
-    o, d = _points(origins, "origins", geometry.dtype), _points(directions, "directions", geometry.dtype)
-    if len(o) != len(d):
-        raise FieldError(f"as many directions as origins, {len(o)}", len(d), "directions")
-    n = len(o)
-    longest = np.abs(d).max(1, initial=0)
-    if n and not longest.all():
-        raise FieldError("a vector that is not zero", d[longest == 0][0].tolist(), f"directions[{int(np.flatnonzero(longest == 0)[0])}]")
-    exponent = np.frexp(longest)[1]
-    rays = new_rays(n, geometry.dtype)
-    rays.ray[:] = 0
-    rays.ray[DX], rays.ray[T], rays.prim[:], rays.depth[:] = 1, DEAD, -1, 0
-    rays.ray[OX:OX + 3, :n] = o.T
-    rays.ray[DX:DX + 3, :n] = np.ldexp(d, -exponent[:, None]).T
-    with np.errstate(over="ignore"):
-        stretch = np.ldexp(np.ones(n), -exponent)
-        rays.ray[START, :n] = _bound(t_min, "t_min", n, 0.0) / stretch
-        rays.ray[T, :n] = _bound(t_max, "t_max", n, -math.inf) / stretch
-    return rays, stretch, geometry, n
+    with _geometries_lock:
+        # called when the scene goes, before another can have its id; no lock there: it may be while this one is held
+        _geometries[key] = weakref.ref(scene, lambda _: _geometries.pop(key, None)), geometry
+        while len(_geometries) > KEPT:
+            _geometries.popitem(last=False)
+    return geometry
 
 
-def _bound(value, name: str, n: int, least: float) -> np.ndarray:
-    """A number or (n,) as (n,), none NaN or below `least`."""
+
+class Query:
+    """N rays and what they are traced through. Raises FieldError, at once for shapes of arrays, or when `rays` meets what is not right."""
+
+    def __init__(self, scene, origins, directions, t_min, t_max, precision):
+        Settings(precision=precision)
+        self.geometry = geometry_of(scene, precision)
+        self.origins, self.directions = _points(origins, "origins"), _points(directions, "directions")
+        self.n = len(self.origins)
+        if len(self.directions) != self.n:
+            raise FieldError(f"as many directions as origins, {self.n}", len(self.directions), "directions")
+        self.t_min, self.t_max = _bound(t_min, "t_min", self.n), _bound(t_max, "t_max", self.n)
+        self.spans = [(a, min(a + CHUNK, self.n)) for a in range(0, self.n, CHUNK)]
+
+    def rays(self, a: int, b: int) -> tuple[Rays, np.ndarray]:
+        """Rays a .. b-1, and what their t is to be multiplied with."""
+        rays, stretch = new_rays(b - a, self.geometry.dtype), np.empty(b - a)
+        with np.errstate(over="ignore"):
+            points = [np.ascontiguousarray(array[a:b], self.geometry.dtype) for array in (self.origins, self.directions)]
+        limits = [bound if len(bound) == 1 else np.ascontiguousarray(bound[a:b]) for bound in (self.t_min, self.t_max)]
+        if not rows.take(*points, *limits, rays, stretch):
+            self.refuse()
+        return rays, stretch
+
+    def refuse(self) -> None:
+        """Raise the error for the first number that is not right."""
+        dtype = self.geometry.dtype
+        for name, array in (("origins", self.origins), ("directions", self.directions)):
+            with np.errstate(over="ignore"):
+                array = array.astype(dtype)
+            bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+            if len(bad):
+                raise FieldError("three finite numbers", array[bad[0]].tolist(), f"{name}[{bad[0]}]")
+        bad = np.flatnonzero(~array.any(axis=1))
+        if len(bad):
+            raise FieldError("a vector that is not zero", array[bad[0]].tolist(), f"directions[{bad[0]}]")
+        for name, bound, good, expected in (("t_min", self.t_min, self.t_min >= 0, "a number of at least 0"),
+                                            ("t_max", self.t_max, ~np.isnan(self.t_max), "a number")):
+            if not good.all():
+                raise FieldError(expected, float(bound[~good][0]), name)
+
+
+def _bound(value, name: str, n: int) -> np.ndarray:
+    """A number or (n,) as float64 (1) or (n)."""
     try:
-        bound = np.broadcast_to(np.asarray(value, np.float64), (n,))
+        bound = np.asarray(value, np.float64)
+        if bound.size != 1 or bound.ndim > 1:
+            bound = np.broadcast_to(bound, (n,))
     except (TypeError, ValueError):
         raise FieldError(f"a number or an array ({n},)", value, name) from None
-    bad = bound[~(bound >= least)]
-    if len(bad):
-        raise FieldError("a number" if least == -math.inf else f"a number of at least {least:g}", float(bad[0]), name)
-    return bound
+    return bound.reshape(-1)
 
 
-def _points(array, name: str, dtype) -> np.ndarray:
+def _points(array, name: str) -> np.ndarray:
+    """An array (n, 3) of float32 or float64, the given one if it is that."""
     try:
-        result = np.asarray(array, np.float64)
+        result = np.asarray(array)
+        if result.dtype not in (np.float32, np.float64):
+            result = np.asarray(array, np.float64)
     except (TypeError, ValueError):
         raise FieldError("an array (N, 3)", array, name) from None
     if result.ndim != 2 or result.shape[1] != 3:
         raise FieldError("an array (N, 3)", result.shape, name)
-    with np.errstate(over="ignore"):
-        result = result.astype(dtype)
-    bad = np.flatnonzero(~np.isfinite(result).all(axis=1))
-    if len(bad):
-        raise FieldError("three finite numbers", result[bad[0]].tolist(), f"{name}[{bad[0]}]")
     return result
 
 
-def _share(trace, n: int, threads: int | None) -> None:
-    """Call trace(a, b) for chunks of columns, on several threads if there is more than one."""
-    edges = list(range(0, n, CHUNK)) + [n]
-    spans = [(a, b) for a, b in zip(edges, edges[1:]) if b > a]
-    threads = min(threads or os.cpu_count() or 1, len(spans))
+def _share(work, n: int, threads: int | None) -> None:
+    """Call work(0) .. work(n - 1), on several threads if there is more than one."""
+    threads = min(threads or os.cpu_count() or 1, n)
     if threads <= 1:
-        for a, b in spans:
-            trace(a, b)
+        for number in range(n):
+            work(number)
         return
     with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(trace, a, b) for a, b in spans]:
-            done.result()
+        try:
+            for done in [pool.submit(work, number) for number in range(n)]:
+                done.result()
+        except FieldError:
+            pool.shutdown(cancel_futures=True)
+            raise

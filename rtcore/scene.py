@@ -273,7 +273,7 @@ class Leaf(NamedTuple):
     visible: bool
 
 
-class Scene(Record, frozen=True, kw_only=True):
+class Scene(Record, frozen=True, kw_only=True, weakref=True):
     """All that a picture needs. `objects` may hold bare shapes; without a camera the scene is framed when it is rendered.
 
     `lights=None` means the studio lights of `rtcore.lights.STUDIO`; an empty tuple means darkness.

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, shading
+from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.lights import AIMS
@@ -18,7 +18,7 @@ from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
 from rtcore.trace import CLOSEST, COUNTS
-from rtcore.wave import new_beam, new_wave
+from rtcore.wave import new_beam, new_rays, new_wave
 
 
 def _wave(dtype):
@@ -76,6 +76,12 @@ def _tree(dtype):
     bvh.build(low, low + 0.1, 2)
 
 
+def _rows(dtype):
+    rays, stretch, points, limit = new_rays(8, dtype), np.empty(8), np.ones((8, 3), dtype), np.ones(1)
+    rows.take(points, points, limit, limit, rays, stretch)
+    rows.give(rays, stretch, np.zeros(0, np.int32), points[:, 0].copy(), np.empty(8, np.int32))
+
+
 def _lit(dtype):
     wave, _, n = _wave(dtype)
     beam = new_beam(n, dtype)
@@ -115,7 +121,7 @@ def _kind(kind):
 GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
-    "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog),
+    "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
     "adaptive": ("rtcore.adaptive", _adaptive),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},

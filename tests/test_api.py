@@ -1,6 +1,8 @@
 """The contract of the Python API: shapes and types of arrays, node indices, limits, and one clear error for each bad input."""
+import gc
 import io
 import math
+import pickle
 import warnings
 
 import numpy as np
@@ -8,7 +10,8 @@ import pytest
 from PIL import Image
 
 import rtcore
-from rtcore import Camera, FieldError, Fog, Material, Mesh, Node, Plane, Scale, Scene, Sphere, Translate
+from rtcore import Camera, FieldError, Fog, Material, Mesh, Node, Plane, Scale, Scene, Sphere, Translate, api
+from rtcore.flatten import flatten
 
 BALL = Scene(objects=[Sphere((0, 0, 0), 1)], camera=Camera(lookfrom=(0, 0, -5)))
 Z = (0, 0, 1)
@@ -28,7 +31,7 @@ def test_shapes_and_types(precision, dtype):
     for n in (0, 1, 7, 8, 9, 1000):
         o, d = np.tile((0.1, 0.2, -5), (n, 1)), np.tile(Z, (n, 1))
         hits = rtcore.intersect(BALL, o, d, precision=precision)
-        assert hits._fields == ("t", "node", "normal", "uv")
+        assert all(a is b for a, b in zip(hits, (hits.t, hits.node, hits.normal, hits.uv), strict=True))
         assert [a.shape for a in hits] == [(n,), (n,), (n, 3), (n, 2)]
         assert [a.dtype for a in hits] == [dtype, np.int32, dtype, dtype]
         assert (hits.node == 0).all() and (np.unique(hits.t).size <= 1)
@@ -49,8 +52,46 @@ def test_any_kind_of_input():
     assert (strided == before).all()
 
 
+def test_the_arrays_given_may_change_before_the_normals_are_asked_for():
+    rng = np.random.default_rng(1)
+    o, d = rng.normal(size=(api.CHUNK + 5, 3)), rng.normal(size=(api.CHUNK + 5, 3))
+    expected = rtcore.intersect(stacked(), o, d)
+    assert 100 < np.count_nonzero(np.linalg.norm(expected.normal, axis=1)) == np.count_nonzero(expected.node >= 0) < len(o)
+    hits = rtcore.intersect(stacked(), o, d)
+    o[:], d[:] = 0, 1
+    assert (hits.normal == expected.normal).all() and (hits.uv == expected.uv).all()
+
+
+def test_hits_are_copied_and_shown():
+    hits = rtcore.intersect(BALL, [(0, 0, -5), (0, 3, -5)], [Z] * 2)
+    assert repr(hits) == "<Hits: 1 of 2 rays>"
+    for asked in (False, True):
+        again = pickle.loads(pickle.dumps(hits))
+        assert all((a == b).all() for a, b in zip(again, hits)) and again.normal.tolist() == [[0, 0, -1], [0, 0, 0]], asked
+
+
+def test_a_scene_is_flattened_once_and_forgotten_with_it(monkeypatch):
+    made = []
+    monkeypatch.setattr(api, "flatten", lambda *words: made.append(words[1]) or flatten(*words))
+
+    def ask(scene, precision="f64"):
+        return rtcore.intersect(scene, [(0, 0, -5)], [Z], precision=precision).t[0]
+    scene, other = Scene(objects=[Sphere((0, 0, 0), 1)]), Scene(objects=[Sphere((0, 0, 0), 2)])
+    assert [ask(scene), ask(other), ask(scene, "f32"), ask(scene), ask(other)] == [4, 3, 4, 4, 3]
+    assert rtcore.occluded(scene, [(0, 0, -5)], [Z]).all() and made == ["f64", "f64", "f32"]
+    one = id(scene)
+    assert (one, "f64") in api._geometries
+    del scene
+    gc.collect()
+    assert (one, "f64") not in api._geometries and (one, "f32") not in api._geometries
+    for radius in range(1, 9):      # a new scene may have the place in memory of one that is gone
+        assert ask(Scene(objects=[Sphere((0, 0, 0), radius / 8)])) == 5 - radius / 8
+    kept = [Scene(objects=[Sphere((0, 0, 0), radius / 8)]) for radius in range(1, 9)]
+    assert [ask(s) for s in kept] == [5 - radius / 8 for radius in range(1, 9)] and len(api._geometries) == api.KEPT
+
+
 def test_t_counts_in_lengths_of_the_direction():
-    lengths = np.array([1e-300, 1e-20, 0.3, 1, 7, 1e20, 1e300])
+    lengths = np.array([1e-305, 1e-20, 0.3, 1, 7, 1e20, 1e308])
     hits = rtcore.intersect(BALL, np.tile((0, 0, -5), (7, 1)), lengths[:, None] * Z)
     np.testing.assert_allclose(hits.t * lengths, 4, rtol=1e-15)
     assert (hits.normal == (0, 0, -1)).all()
@@ -129,6 +170,24 @@ BAD = {
     "directions[0]: expected three finite numbers": ([(0, 0, 0)], [(math.inf, 0, 0)]),
     "directions[1]: expected a vector that is not zero": ([(0, 0, 0)] * 2, [Z, (0, -0.0, 0)]),
 }
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_bad_number_in_any_chunk_is_told_with_its_row(threads):
+    n = 3 * api.CHUNK
+    for name, value, row, expected in (("origins", math.nan, n - 1, "three finite numbers, got [0.0, nan, 0.0]"),
+                                       ("directions", -math.inf, n // 2, "three finite numbers, got [0.0, -inf, 1.0]"),
+                                       ("directions", 0, 5, "a vector that is not zero, got [0.0, 0.0, 0.0]")):
+        given = {"origins": np.zeros((n, 3)), "directions": np.tile(np.float64(Z), (n, 1))}
+        given[name][row, 1:2 if value else 3] = value
+        given["directions"][row + 1:row + 2, 0] = math.nan if name == "origins" else 7     # told second, or fine
+        with pytest.raises(FieldError) as error:
+            rtcore.intersect(BALL, **given, threads=threads)
+        assert str(error.value) == f"{name}[{row}]: expected {expected}"
+    t_min = np.zeros(n)
+    t_min[-1] = -2
+    with pytest.raises(FieldError, match="^t_min: expected a number of at least 0, got -2.0$"):
+        rtcore.intersect(BALL, np.zeros((n, 3)), np.ones((n, 3)), t_min, threads=threads)
 
 
 @pytest.mark.parametrize("message", BAD)

@@ -17,7 +17,7 @@ LAYERS = (
     {"rtcore.fields"},
     {"rtcore.camera"},
     {"rtcore.scene"},
-    {"rtcore.exact", "rtcore.expansions", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.wave"},
+    {"rtcore.exact", "rtcore.expansions", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.rows", "rtcore.wave"},
     {"rtcore.bvh", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film",
