@@ -107,7 +107,8 @@ class Render:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
         a thread, ends the threads' work first."""
         one = self.schedule[self.number]
-        queue, cost = tiles(one, *self.settings.size), weight(one, *self.settings.size)
+        queue = tiles(one, *self.settings.size)
+        each = weight(one, *self.settings.size) / max(len(queue), 1)
         todo, halt = iter(queue), threading.Event()
         # time runs out only once every pixel has a sample
         deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
@@ -116,7 +117,7 @@ class Render:
         def stale() -> bool:
             return halt.is_set() or cancelled() or time.perf_counter() > deadline
 
-        shares = [pool.submit(self._work, scratch, one, todo, cost / max(len(queue), 1), stale) for scratch in self.scratches]
+        shares = [pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
         try:
             while wait(shares, PARTIAL, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
                 self.elapsed = time.perf_counter() - self.prepared
@@ -129,7 +130,7 @@ class Render:
         results = [share.result() for share in shares]      # an exception of a thread comes out here
         self.finished = all(results)
         if self.finished:
-            self.spent += cost
+            self.spent = sum(weight(done, *self.settings.size) for done in self.schedule[:self.number + 1])
             if one.spacing == 1 and one.pixels is None:
                 self.samples = one.samples.stop
 
@@ -308,7 +309,7 @@ class Renderer:
                 "fallback": {"rays": slow, "share": slow / max(traced, 1)}, "uncertified": uncertified,
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
-                "error": {"rmse_estimate": render.error()}}
+                "error": {"rmse_estimate": render.error()}, "converged": render.converged}
 
 
 def cores() -> int:

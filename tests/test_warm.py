@@ -62,7 +62,8 @@ for precision in ("f64", "f32"):
             assert missing(scene, Settings(precision=precision)) == []
             image = rtcore.render(scene, (24, 16), 2, precision=precision, error=1e-9)
             assert image.stats["rays"]["refraction"] > 0
-    for view in ("normal", "depth", "object"):
+    assert rtcore.render(scene, (24, 16), 12, precision=precision, adaptive=True).stats["samples"]["most"] > 8
+    for view in ("normal", "depth", "object", "error"):
         rtcore.render(scene, (24, 16), precision=precision, view=view)
     hits = rtcore.intersect(scene, [(0, 0, -5)] * 20, [(0, 0, 1)] * 20, precision=precision)
     rtcore.occluded(scene, [(0, 0, -5)], [(0, 0, 1)], precision=precision)
