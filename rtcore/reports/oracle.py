@@ -267,7 +267,7 @@ def _blob(s: Blob, o, d):
     """The ends of all elements' spheres cut the ray; between them the raw quartic's complex roots, where the field can reach at all."""
     elements = [(vector(c), mp.mpf(r), mp.mpf(w)) for c, r, w in s.elements]
     threshold, forms = mp.mpf(s.threshold), []
-    speed = power_near(mp.sqrt(dot(d, d)) / max(r for _, r, _ in elements))     # as for the torus
+    speed = mp.sqrt(dot(d, d)) / max(r for _, r, _ in elements)     # as for the torus
     d = times(1 / speed, d)
     for center, radius, strength in elements:       # 1 - |p - center|²/radius² as a t² + 2 b t + c
         f = sub(o, center)
