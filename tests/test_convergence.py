@@ -10,6 +10,7 @@ from commandline import ball_in, one_line, run_here
 
 import rtcore
 from rtcore.progressive import Renderer
+from rtcore.reports import calibration as calibration_table
 from rtcore.reports import convergence
 from rtcore.reports.convergence import Reference, Row
 from rtcore.reports.convergence_page import calibration, fitted_slope, page, seconds_to
@@ -117,3 +118,12 @@ def test_slope_time_and_calibration():
     assert mean == pytest.approx(2 ** 0.25) and worst == pytest.approx(2) and all(map(math.isnan, calibration([])))
     text = page(rows, Reference(np.zeros((6, 8, 3)), 64, 1e-3), "x")
     assert "| uniform | 1 | 8 | 8 | 0.125 | 0.188 | -1.00 | 1.19 | 2.00 | 8 |" in text and "rmse 0.125 is that of 8 uniform samples" in text
+
+
+def test_the_table_of_calibration(scene, capsys):
+    assert calibration_table.main([str(scene), "--size", "32", "24", "--reference-spp", "256"]) == 0
+    out, err = capsys.readouterr()
+    name, rmse, ratio, share, samples = (cell.strip() for cell in out.splitlines()[2].strip("|").split("|"))
+    assert err == "" and name == "ball" and 0 < float(rmse) < 0.1 and 0.6 < float(ratio) < 1.6
+    assert share.startswith("x ") and 8 < float(samples) < 64
+    assert calibration_table.main(["nowhere.yaml"]) == 2 and one_line(capsys.readouterr().err.replace("rtcore", "rayscope", 1))
