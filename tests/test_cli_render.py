@@ -80,6 +80,25 @@ def test_time_and_error_end_a_render(scene, run):
     assert stats["samples_per_pixel"] < render_command.NO_END and stats["error"]["rmse_estimate"] <= 0.1
 
 
+def test_progress_toward_an_error_is_told_by_the_error(scene, run, monkeypatch):
+    shown = []
+    monkeypatch.setattr(_progress.Progress, "show", lambda self, share, doing="", left=None: shown.append((share, doing, left)))
+    assert run("render", scene, "-o", "a.png", "--size", "160x120", "--error", 0.002)[0] == 0
+    told = [one for one in shown if "until the error is 0.002" in one[1]]
+    assert len(told) > 3 and all(0 <= share <= 1 for share, *_ in told) and told[-1][0] > 0.9
+    assert all(left is None or left < 60 for *_, left in told)
+
+
+def test_samples_are_adaptive_where_they_end_by_time_or_error_and_else_if_asked_for(scene, run):
+    def samples(*words):
+        assert run("render", scene, "-o", "a.png", "--size", "64x48", *words, "--stats", "s.json")[0] == 0
+        return json.loads(Path("s.json").read_text())["samples"]
+    assert samples("--spp", 16) == {"least": 16, "mean": 16, "most": 16}
+    spread = samples("--spp", 16, "--adaptive")
+    assert spread["least"] == 8 and spread["most"] > 32 and 15 < spread["mean"] <= 16
+    assert samples("--error", 0.004)["most"] > 8 and len(set(samples("--error", 0.004, "--no-adaptive").values())) == 1
+
+
 def test_a_mesh_file_renders_framed_and_lit(scene, run):
     Path("a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert run("render", "a.obj", "-o", "a.png", "--size", "32x24", "--spp", 1, "--stats", "s.json")[0] == 0

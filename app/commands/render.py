@@ -1,6 +1,7 @@
 """`rayscope render`: a picture of a scene, without a window."""
 import argparse
 import contextlib
+import math
 import signal
 import sys
 import time
@@ -23,6 +24,7 @@ from app.commands._shared import (
     writable_or_refused,
     write_json,
 )
+from app.forecast import Forecast
 
 NAME = "render"
 HELP = "render a scene to a picture"
@@ -109,17 +111,22 @@ def _check_outputs(args) -> None:
 def trace(scene, camera, settings, interrupted):
     """Render with progress until it is done or interrupted. Returns the pixels, None if there are none yet, and the stats."""
     from rtcore.progressive import Renderer, RenderRequest
-    renderer, frame = Renderer(), None
+    renderer, frame, forecast = Renderer(), None, Forecast()
     start = time.monotonic()
     try:
         aim = f" of {settings.samples} samples" if settings.error is None else f" samples, until the error is {settings.error:g}"
         with Progress("rendering") as bar:
             for frame in renderer.frames(RenderRequest(scene, camera, settings), interrupted, coarse=False):
-                if settings.seconds is None:
+                used = time.monotonic() - start
+                if settings.seconds is not None:
+                    bar.show(min(used / settings.seconds, 1.0), f"{frame.mean:.4g} samples", max(settings.seconds - used, 0.0))
+                elif settings.error is None:
                     bar.show(renderer.progress, f"{frame.mean:.4g}{aim}")
                 else:
-                    used = time.monotonic() - start
-                    bar.show(min(used / settings.seconds, 1.0), f"{frame.mean:.4g} samples", max(settings.seconds - used, 0.0))
+                    forecast.note(frame.elapsed, frame.mean, frame.error)
+                    ends = forecast.left(settings.samples, None, settings.error) if frame.error else None
+                    left = sum(ends) / 2 if ends else math.inf
+                    bar.show(used / (used + left), f"{frame.mean:.4g}{aim}", left if ends else None)
         if frame is None:
             return None, {}
         return frame.pixels if frame.done else renderer.picture(), renderer.stats()
