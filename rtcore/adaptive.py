@@ -18,7 +18,8 @@ FIRST = 8               # samples of every pixel before any gets more
 GROWTH = 0.5            # a pass costs at most this share of all samples so far
 PRIOR = 4.0             # samples that the neighbours' scatter is worth: with 1 the estimate was 20 % too low at first, with 8 10 % too high
 STEPS = 2               # a pass at most quadruples a pixel's samples
-LEVELS = 17             # a pixel gets at most 2^16 samples
+HIGHEST = 16            # a pixel gets at most 2 to the power of that
+LEVELS = 32             # logarithms of a number of samples
 POWER = 1.5             # the squared error of an edge falls with the number of samples to this power
 CONVERGED = 2.0 ** -14  # an error that no screen shows: a fifth of the first step above black in an 8-bit picture
 FEW = 16                # pixels' worth of trust in POWER where few pixels tell the scale
@@ -90,12 +91,13 @@ def rmse_estimate(film: Film, width: int, height: int) -> float | None:
     return float(np.sqrt(squared.mean(dtype=np.float64))) if len(squared) else None
 
 
-def refinement(film: Film, width: int, height: int, order: np.ndarray, budget: float, growth: float = GROWTH) -> Pass | None:
+def refinement(film: Film, width: int, height: int, order: np.ndarray, budget: float, growth: float = GROWTH,
+               enough: float = CONVERGED) -> Pass | None:
     """The next pass: the pixels, in `order`, that get more samples, each in all a power of two, so that the expected error of the picture
     is the least for the pass's cost. budget: samples the whole picture may have, per pixel. None if it is spent; a pass without pixels if
-    nothing is left that could be seen."""
+    no pixel's error is larger than `enough`."""
     squared = squared_errors(film, width, height)
-    open_ = np.flatnonzero(squared > CONVERGED ** 2)
+    open_ = np.flatnonzero(squared > enough ** 2)
     spent = int(film.count.sum(dtype=np.int64))
     left = min(budget * width * height - spent, growth * spent)
     if len(open_) == 0:
@@ -121,7 +123,7 @@ def _share(wish: np.ndarray, level: np.ndarray, left: float) -> np.ndarray:
     at, wishes, number = kind // count, kind % count + lowest, kinds[kind]
 
     def levels(wish, at, cut):
-        return np.clip((wish - cut + BINS // 2) // BINS, at, np.minimum(at + STEPS, LEVELS - 1))
+        return np.clip((wish - cut + BINS // 2) // BINS, at, np.minimum(at + STEPS, HIGHEST))
 
     def cost(cut):
         return (number * ((1 << np.maximum(levels(wishes, at, cut), at)) - (1 << at))).sum()

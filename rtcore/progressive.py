@@ -147,9 +147,7 @@ class Render:
 
     def error(self) -> float | None:
         """The estimated root mean square error, over pixels and channels; None below two samples."""
-        if self.plan.samples < 2:
-            return None
-        if self.samples < 2:
+        if min(self.plan.samples, self.samples) < 2:
             return None
         uneven = self.adaptive and self.samples >= adaptive.FIRST
         return adaptive.rmse_estimate(self.film, *self.settings.size) if uneven else films.rmse_estimate(self.film)
@@ -170,7 +168,8 @@ class Render:
         size = self.settings.size
         if self.order is None:
             self.order = tile_order(*size)
-        one = adaptive.refinement(self.film, *size, self.order, self.plan.samples, growth)
+        one = adaptive.refinement(self.film, *size, self.order, self.plan.samples, growth,
+                                  min(adaptive.CONVERGED, target or adaptive.CONVERGED))
         self.converged = one is not None and len(one.pixels) == 0
         if one is None or self.converged:
             return False

@@ -168,6 +168,22 @@ def test_errors_are_those_of_the_replicates_where_all_pixels_are_alike():
     assert films.rmse_estimate(film) == pytest.approx((0.02 / 16) ** 0.5) == pytest.approx(adaptive.rmse_estimate(film, 30, 20), rel=0.01)
 
 
+def test_any_number_of_samples_has_an_estimate():
+    for n in (2, 3, 1 << 16, (1 << 20) - 1, 1 << 20):
+        errors = adaptive.squared_errors(film_of(np.full((4, 5), 0.02), n), 5, 4)
+        assert np.isfinite(errors).all() and 0.01 / n ** 1.5 < errors.min() <= errors.max() < 0.03 / n
+    film = film_of(np.full((4, 5), 0.2), 1 << 16)
+    assert adaptive.refinement(film, 5, 4, tile_order(5, 4), 1 << 20, enough=1e-9) is None      # as far as it goes
+
+
+def test_enough_is_as_little_as_is_asked_for():
+    film = film_of(np.full((4, 5), 1e-9), 8)
+    assert len(adaptive.refinement(film, 5, 4, tile_order(5, 4), 64.0).pixels) == 0
+    assert len(adaptive.refinement(film, 5, 4, tile_order(5, 4), 64.0, enough=1e-6).pixels) > 0
+    frames, _ = render(BALLS, samples=4096, error=5e-5, size=(24, 18))
+    assert frames[-1].done and frames[-1].error <= 5e-5
+
+
 def test_a_pixel_without_scatter_beside_an_edge_is_not_forgotten():
     scatter = np.zeros((20, 30))
     scatter[:, 15] = 0.2
