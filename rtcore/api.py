@@ -19,7 +19,7 @@ from rtcore.progressive import Renderer, RenderRequest
 from rtcore.scene import Scene
 from rtcore.settings import Settings
 from rtcore.trace import CLOSEST
-from rtcore.wave import GX, OPAQUE, SURFACE_ROWS, U, Rays, new_rays
+from rtcore.wave import GX, OPAQUE, RAY_ROWS, SURFACE_ROWS, U, Rays, new_rays, padded
 
 CHUNK = 1 << 13     # rays traced in one go: their arrays stay in the second-level cache
 KEPT = 4            # scenes and precisions whose geometry is kept for the next query
@@ -91,7 +91,7 @@ class Traced(NamedTuple):
 
     geometry: Geometry
     spans: list[tuple[int, int]]    # which rays each chunk holds
-    rays: list[Rays]
+    chunks: list[Rays]
     threads: int | None
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
@@ -103,7 +103,7 @@ class Traced(NamedTuple):
             a, b = self.spans[number]
             found = np.zeros((SURFACE_ROWS, b - a), self.geometry.dtype)
             for group in self.geometry.groups:
-                group.kind.surface(self.rays[number], b - a, found, group.table, group.first)
+                group.kind.surface(self.chunks[number], b - a, found, group.table, group.first)
             normal[a:b], uv[a:b] = found[GX:GX + 3].T, found[U:U + 2].T
 
         _share(look, len(self.spans), self.threads)
@@ -138,17 +138,18 @@ def intersect(scene: Scene, origins, directions, t_min=0.0, t_max=math.inf, prec
     query = Query(scene, origins, directions, t_min, t_max, precision)
     dtype, spans = query.geometry.dtype, query.spans
     t, node = np.empty(query.n, dtype), np.empty(query.n, np.int32)
-    traced = [None] * len(spans)
+    chunks = _chunks(spans, dtype)
+    leaf = query.geometry.leaf if len(query.geometry.leaf) else np.zeros(1, np.int32)
 
     def trace(number: int) -> None:
         a, b = spans[number]
-        traced[number], stretch = query.rays(a, b)
+        stretch = query.take(a, b, chunks[number])
         for group in query.geometry.groups:
-            group.kind.intersect(traced[number], b - a, group.tree, group.table, group.first, CLOSEST)
-        rows.give(traced[number], stretch, query.geometry.leaf, t[a:b], node[a:b])
+            group.kind.intersect(chunks[number], b - a, group.tree, group.table, group.first, CLOSEST)
+        rows.give(chunks[number], stretch, leaf, t[a:b], node[a:b])
 
     _share(trace, len(spans), threads)
-    return Hits(t, node, Traced(query.geometry, spans, traced, threads))
+    return Hits(t, node, Traced(query.geometry, spans, chunks, threads))
 
 
 def occluded(scene: Scene, origins, directions, t_max=math.inf, precision: str = "f64", threads: int | None = None) -> np.ndarray:
@@ -159,7 +160,8 @@ def occluded(scene: Scene, origins, directions, t_max=math.inf, precision: str =
 
     def trace(number: int) -> None:
         a, b = query.spans[number]
-        rays, _ = query.rays(a, b)
+        rays = new_rays(b - a, query.geometry.dtype)
+        query.take(a, b, rays)
         for group in query.geometry.groups:
             group.kind.intersect(rays, b - a, group.tree, group.table, group.first, opaque)
         np.greater_equal(rays.prim[:b - a], 0, out=result[a:b])
@@ -192,7 +194,7 @@ def geometry_of(scene: Scene, precision: str) -> Geometry:
 
 
 class Query:
-    """N rays and what they are traced through. Raises FieldError, at once for shapes of arrays, or when `rays` meets what is not right."""
+    """N rays and what they are traced through. Raises FieldError, at once for shapes of arrays, or when `take` meets what is not right."""
 
     def __init__(self, scene, origins, directions, t_min, t_max, precision):
         Settings(precision=precision)
@@ -204,15 +206,15 @@ class Query:
         self.t_min, self.t_max = _bound(t_min, "t_min", self.n), _bound(t_max, "t_max", self.n)
         self.spans = [(a, min(a + CHUNK, self.n)) for a in range(0, self.n, CHUNK)]
 
-    def rays(self, a: int, b: int) -> tuple[Rays, np.ndarray]:
-        """Rays a .. b-1, and what their t is to be multiplied with."""
-        rays, stretch = new_rays(b - a, self.geometry.dtype), np.empty(b - a)
+    def take(self, a: int, b: int, rays: Rays) -> np.ndarray:
+        """Let `rays` be rays a .. b-1; returns what their t is to be multiplied with."""
+        stretch = np.empty(b - a)
         with np.errstate(over="ignore"):
             points = [np.ascontiguousarray(array[a:b], self.geometry.dtype) for array in (self.origins, self.directions)]
         limits = [bound if len(bound) == 1 else np.ascontiguousarray(bound[a:b]) for bound in (self.t_min, self.t_max)]
         if not rows.take(*points, *limits, rays, stretch):
             self.refuse()
-        return rays, stretch
+        return stretch
 
     def refuse(self) -> None:
         """Raise the error for the first number that is not right."""
@@ -230,6 +232,14 @@ class Query:
                                             ("t_max", self.t_max, ~np.isnan(self.t_max), "a number")):
             if not good.all():
                 raise FieldError(expected, float(bound[~good][0]), name)
+
+
+def _chunks(spans: list[tuple[int, int]], dtype) -> list[Rays]:
+    """Rays for every chunk, with nothing set, all in the same few blocks of memory: a system is slow to give many."""
+    most = padded(max((b - a for a, b in spans), default=0))
+    kinds = (((RAY_ROWS, most), dtype), ((most,), np.int32), ((most,), np.int32), ((most,), np.uint8), ((2,), np.int64))
+    blocks = [np.empty((len(spans), *shape), kind) for shape, kind in kinds]
+    return [Rays(*parts) for parts in zip(*blocks)]
 
 
 def _bound(value, name: str, n: int) -> np.ndarray:

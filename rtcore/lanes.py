@@ -380,19 +380,6 @@ def store(tc, array, row, i, x):
 
 
 @intrinsic
-def prefetch(tc, array, row):
-    """Have the processor fetch the first four cache lines of a row, which will be read soon. array: 2-D, C-contiguous."""
-    def gen(ctx, b, sig, a):
-        p = b.bitcast(_at(ctx, b, sig, (*a, ir.Constant(ir.IntType(64), 0)), None, 1), I8.as_pointer())
-        t = ir.FunctionType(ir.VoidType(), [I8.as_pointer(), I32, I32, I32])
-        function = cgutils.get_or_insert_function(b.module, t, "llvm.prefetch.p0i8")
-        for line in range(4):
-            b.call(function, [b.gep(p, [I32(64 * line)]), I32(0), I32(3), I32(1)])
-        return ctx.get_dummy_value()
-    return types.void(array, types.intp), gen
-
-
-@intrinsic
 def exceeds(tc, array, i, number):
     """Mask of the lanes where the int32 array[i + lane] > number."""
     def gen(ctx, b, sig, a):

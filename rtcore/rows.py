@@ -20,7 +20,8 @@ def take(origins, directions, low, high, rays, stretch):
     n = len(origins)
     last_low, last_high = len(low) - 1, len(high) - 1
     good = True
-    floor, power, back = math.inf, 1.0, 1.0
+    words = np.empty(2, np.int64)
+    numbers = words.view(np.float64)
     for i in range(n):
         x, y, z = origins[i, 0], origins[i, 1], origins[i, 2]
         dx, dy, dz = directions[i, 0], directions[i, 1], directions[i, 2]
@@ -28,11 +29,11 @@ def take(origins, directions, low, high, rays, stretch):
         longest = np.float64(max(abs(dx), max(abs(dy), abs(dz))))
         # 0 · inf and 0 · NaN are NaN
         good &= (0 * x + 0 * y + 0 * z + 0 * dx + 0 * dy + 0 * dz == 0) & (longest > 0) & (start >= 0) & (end == end)
-        if not floor <= longest < 2 * floor:    # most rays are as long as the last
-            exponent = math.frexp(longest)[1]
-            floor = math.ldexp(0.5, exponent)
-            exponent = min(max(exponent, -MOST), MOST)
-            power, back = math.ldexp(1.0, -exponent), math.ldexp(1.0, exponent)
+        # the bits of a float64: its exponent, 1022 for 0.5 .. 1, begins at bit 52
+        numbers[0] = longest
+        exponent = min(max(words[0] >> 52, 1022 - MOST), 1022 + MOST)
+        words[0], words[1] = (2045 - exponent) << 52, (exponent + 1) << 52
+        power, back = numbers[0], numbers[1]
         put_ray(rays, i, x, y, z, dx * power, dy * power, dz * power, end * back)
         rays.ray[START, i] = start * back
         stretch[i] = power
@@ -42,8 +43,11 @@ def take(origins, directions, low, high, rays, stretch):
 
 @kernel
 def give(rays, stretch, leaf, t, node):
-    """The distance and the leaf that each ray hit, in the caller's lengths: t of P (n), inf for nothing; node int32 (n), -1 for nothing."""
+    """The distance and the leaf that each ray hit, in the caller's lengths: t of P (n), inf for nothing; node int32 (n), -1 for nothing.
+    leaf: int32, of each primitive, at least one number."""
     for i in range(len(t)):
         prim = rays.prim[i]
-        t[i] = rays.ray[T, i] * stretch[i] if prim >= 0 else math.inf
-        node[i] = leaf[prim] if prim >= 0 else -1
+        # no branch: nobody can guess what a ray hits
+        far, owner = rays.ray[T, i] * stretch[i], leaf[max(prim, 0)]
+        t[i] = far if prim >= 0 else math.inf
+        node[i] = owner if prim >= 0 else -1

@@ -15,8 +15,9 @@ import numpy as np
 
 from rtcore.bvh import LINK, NODE, STACK, WIDTH
 from rtcore.jit import inline, inline_new
-from rtcore.lanes import (along, any_lane, bits, fma, greatest, largest, least, load, load3, lowest_bit, narrow, prefetch, select, size,
+from rtcore.lanes import (along, any_lane, bits, fma, greatest, largest, least, load, load3, lowest_bit, narrow, select, size,
                           smallest, splat, store, vec3, with_sign)
+from rtcore.turns import prefetch_either, push
 from rtcore.wave import DX, OX, START, T
 
 PACKET = 64
@@ -45,8 +46,10 @@ class Walk(NamedTuple):
     coarse: np.ndarray  # float32 (16, 64), rows as named above, in the tree's frame
     fine: np.ndarray    # P (2, 64): where the ray enters the frame, how its t scales
     beam: np.ndarray    # float32 (16), as named above
-    stack: np.ndarray   # int32 (slots, most): what waits: of single rays links, of packets 2 (8 node + column) + whether all meet it
-    entry: np.ndarray   # float32 (slots, most): where they are entered
+    limit: np.ndarray   # int32 (16, 64): the bits of coarse
+    keys: np.ndarray    # int64 (slots, most): what waits of single rays, as `push` leaves it
+    stack: np.ndarray   # int32 (1, most): what waits of packets: 2 (8 node + column) + whether all meet it
+    entry: np.ndarray   # float32 (1, most): where it is entered
     mask: np.ndarray    # int64 (most): the vectors of rays that wait for a node
     slots: np.ndarray   # int64 (slots, 2): the ray, -1 none any more; how many nodes wait
     near: np.ndarray    # float32 (1, 8): where the children of a node are
@@ -56,9 +59,10 @@ class Walk(NamedTuple):
 @inline_new
 def new_walk(rays):
     """Scratch for walks over these rays."""
-    return Walk(np.empty((16, PACKET), np.float32), np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32),
-                np.empty((SLOTS, STACK), np.int32), np.empty((SLOTS, STACK), np.float32), np.empty(STACK, np.int64),
-                np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(7, np.int64))
+    coarse = np.empty((16, PACKET), np.float32)
+    return Walk(coarse, np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32), coarse.view(np.int32),
+                np.empty((SLOTS, STACK + WIDTH), np.int64), np.empty((1, STACK), np.int32), np.empty((1, STACK), np.float32),
+                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(7, np.int64))
 
 
 @inline
@@ -198,10 +202,11 @@ def _reach(far, speed, enter):
 def shrink(walk, rays, start):
     """After a leaf: the active vectors need not look past what they hit."""
     coarse, active = walk.coarse, walk.state[ACTIVE]
-    for g in range(GROUPS):
-        if (active >> g) & 1:
-            reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
-            store(coarse, REACH, g * 8, least(load(coarse, REACH, g * 8), reach))
+    while active:
+        g = lowest_bit(active)
+        active &= active - 1
+        reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
+        store(coarse, REACH, g * 8, least(load(coarse, REACH, g * 8), reach))
     if walk.state[MODE] == BEAM:
         farthest = splat(np.float32(-1))
         for g in range(GROUPS):
@@ -211,9 +216,16 @@ def shrink(walk, rays, start):
 
 
 @inline
-def next_leaf(walk, tree):
-    """The next leaf that rays of the packet may hit, as `leaf_first` and `leaf_end` read it, or -1; `active` tells the vectors that may."""
-    return _next_of_ray(walk, tree) if walk.state[MODE] == SINGLY else _next_of_packet(walk, tree)
+def next_leaf(walk, tree, table):
+    """The next leaf that rays of the packet may hit, as `leaf_first` and `leaf_end` read it, or -1; `active` tells the vectors that may.
+    table: of the primitives, a `kind.Table`, to be fetched ahead."""
+    return _next_of_ray(walk, tree, table) if walk.state[MODE] == SINGLY else _next_of_packet(walk, tree)
+
+
+@inline
+def only_ray(walk):
+    """The only ray of the packet that may hit the leaf, or -1: any of the active vectors' may."""
+    return walk.slots[walk.state[TOP], 0] if walk.state[MODE] == SINGLY else -1
 
 
 @inline
@@ -229,9 +241,9 @@ def leaf_end(leaf):
 
 
 @inline
-def _next_of_ray(walk, tree):
+def _next_of_ray(walk, tree, table):
     """Rays singly, some in turns: while one's next node comes from memory, the others go on."""
-    coarse, stack, entry, near, state, slots = walk.coarse, walk.stack, walk.entry, walk.near, walk.state, walk.slots
+    coarse, limit, keys, state, slots = walk.coarse, walk.limit, walk.keys, walk.state, walk.slots
     box, link = tree.box, tree.link
     slot, running, waiting = state[TOP], state[RUNNING], state[WAITING]
     while running > 0:
@@ -245,19 +257,19 @@ def _next_of_ray(walk, tree):
                 running -= 1
                 continue
             slots[slot, 0], slots[slot, 1] = lowest_bit(waiting), 1
-            stack[slot, 0], entry[slot, 0] = 0, 0
+            keys[slot, 0] = 0       # the root, entered at 0
             waiting &= waiting - 1
             continue
         top -= 1
-        reach, node = coarse[REACH, ray], np.int64(stack[slot, top])
-        while top > 0 and not entry[slot, top] <= reach:
+        reach, key = limit[REACH, ray], keys[slot, top]
+        while top > 0 and key >> 32 > reach:
             top -= 1
-            node = np.int64(stack[slot, top])
-        if not entry[slot, top] <= reach:
-            slots[slot, 1] = top
+            key = keys[slot, top]
+        slots[slot, 1] = top
+        if key >> 32 > reach:
             continue
+        node = np.int64(np.int32(key))
         if node < 0:
-            slots[slot, 1] = top
             state[TOP], state[RUNNING], state[WAITING], state[ACTIVE] = slot, running, waiting, 1 << (ray >> 3)
             return -1 - node
         ix, iy, iz = coarse[INVERSE, ray], coarse[INVERSE + 1, ray], coarse[INVERSE + 2, ray]
@@ -273,21 +285,10 @@ def _next_of_ray(walk, tree):
         v = fma(load(box, row + y1, 0), iy, coarse[LOWS + y1, ray])
         w = fma(load(box, row + z1, 0), iz, coarse[LOWS + z1, ray])
         enter = greatest(greatest(x, y), greatest(z, np.float32(0)))
-        met = bits(enter <= least(least(u, v), least(w, reach)))
-        store(near, 0, 0, enter)
-        base = top
-        while met:
-            k = lowest_bit(met)
-            met &= met - 1
-            at, there, child = near[0, k], top, link[row + LINK, k]
-            while there > base and entry[slot, there - 1] < at:
-                entry[slot, there], stack[slot, there] = entry[slot, there - 1], stack[slot, there - 1]
-                there -= 1
-            entry[slot, there], stack[slot, there] = at, child
-            top += 1
-        if top > 0 and stack[slot, top - 1] >= 0:
-            prefetch(box, NODE * np.int64(stack[slot, top - 1]))
+        top += push(keys, slot, top, enter, link, row + LINK, enter <= least(least(u, v), least(w, coarse[REACH, ray])))
         slots[slot, 1] = top
+        child = np.int64(np.int32(keys[slot, max(top - 1, 0)]))
+        prefetch_either(child >= 0, box, NODE * child, table.data, leaf_first(-1 - child))
     state[TOP], state[RUNNING], state[WAITING] = slot, running, waiting
     return -1
 

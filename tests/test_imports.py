@@ -18,7 +18,8 @@ LAYERS = (
     {"rtcore.camera"},
     {"rtcore.scene"},
     {"rtcore.exact", "rtcore.expansions", "rtcore.jit", "rtcore.lanes", "rtcore.pairs", "rtcore.rows", "rtcore.wave"},
-    {"rtcore.bvh", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},     # shapes walk the tree in their kernels, so it comes before them
+    # shapes walk the tree in their kernels, so it comes before them
+    {"rtcore.bvh", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film",
      "rtcore.schedule", "rtcore.adaptive"},

@@ -153,7 +153,7 @@ def intersect(rays, n, tree, table, first, opacity):
     data = table.data
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 count = take_elements(scratch.element, data, q, table.extra)
@@ -176,7 +176,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                    opacity)
                             late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @inline

@@ -122,7 +122,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most = np.float64(table.data[q, OWN])
@@ -134,7 +134,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             t, ok = meet(rays.ray, i, table.exact, q, todo, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel

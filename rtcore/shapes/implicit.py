@@ -161,7 +161,7 @@ def intersect(rays, n, tree, table, first, opacity):
         rays.doubt[:n] = 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 m = 0
@@ -180,7 +180,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             note_doubt(rays, i, first + q, found, doubt, m)
                         m += 8
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @inline

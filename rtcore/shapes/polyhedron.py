@@ -198,7 +198,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
@@ -210,7 +210,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, near, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel

@@ -82,7 +82,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
@@ -99,7 +99,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 settle(rays, i + lowest(late), first + q, table, q, IN_BOX, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel

@@ -130,7 +130,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
@@ -146,7 +146,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 settle_sphere(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel
@@ -221,7 +221,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
@@ -237,7 +237,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                                 settle_ellipsoid(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel

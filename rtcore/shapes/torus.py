@@ -81,7 +81,7 @@ def intersect(rays, n, tree, table, first, opacity):
     exact = table.exact
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
@@ -107,7 +107,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                     settle(rays, i + lowest(late), first + q, table, q, opacity)
                                     late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel

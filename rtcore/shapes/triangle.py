@@ -7,10 +7,10 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
+from rtcore.lanes import any_lane, bits, fma, load, load3, lowest_bit, select, size, store
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, hit_from, normalized, put_surface
@@ -202,33 +202,38 @@ def intersect(rays, n, tree, table, first, opacity):
         if walk.state[TOP] == 0:
             continue
         shear(rays, start, n, slant, axes)
-        leaf = next_leaf(walk, tree)
+        leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            ray = only_ray(walk)
+            wanted = 7 if ray < 0 else 1 << int(slant[3, ray])
             for q in range(leaf_first(leaf), leaf_end(leaf)):
-                side = table.side[q]
-                for g in range(PACKET // 8):
-                    if (walk.state[ACTIVE] >> g) & 1:
-                        i = start + g * 8
-                        for axis in range(3):
-                            if (axes[g] >> axis) & 1:
-                                u, v, w, az, bz, cz = edges(rays.ray, i, g * 8, table.data, q, slant, axis)
-                                ok = ((u <= 0) & (v <= 0) & (w <= 0)) | ((u >= 0) & (v >= 0) & (w >= 0))
-                                if axes[g] != 1 << axis:
-                                    ok = ok & (load(slant, 3, g * 8) == axis)
-                                if any_lane(ok):
-                                    det, inverse = u + v + w, load(slant, 2, g * 8)
-                                    late = bits(ok & (size(det) < tiny))
-                                    if side & (FRONT | BACK):
-                                        # a ray along -axis, inverse < 0, sees the front where det < 0
-                                        facing = det * inverse
-                                        ok = ok & (facing > 0) if side == FRONT or side == BACK + MIRRORED else ok & (facing < 0)
-                                    ok = ok & (size(det) >= tiny)
-                                    record(rays, i, first + q, (u * az + v * bz + w * cz) / det * inverse, ok, opacity)
-                                    while late:
-                                        settle(rays, i + lowest(late), first + q, table, q, axis, opacity)
-                                        late &= late - 1
+                side, active = table.side[q], walk.state[ACTIVE]
+                while active:
+                    g = lowest_bit(active)
+                    active &= active - 1
+                    i = start + g * 8
+                    seen = axes[g] & wanted
+                    while seen:
+                        axis = lowest_bit(seen)
+                        seen &= seen - 1
+                        u, v, w, az, bz, cz = edges(rays.ray, i, g * 8, table.data, q, slant, axis)
+                        ok = ((u <= 0) & (v <= 0) & (w <= 0)) | ((u >= 0) & (v >= 0) & (w >= 0))
+                        if axes[g] != 1 << axis:
+                            ok = ok & (load(slant, 3, g * 8) == axis)
+                        if any_lane(ok):
+                            det, inverse = u + v + w, load(slant, 2, g * 8)
+                            late = bits(ok & (size(det) < tiny))
+                            if side & (FRONT | BACK):
+                                # a ray along -axis, inverse < 0, sees the front where det < 0
+                                facing = det * inverse
+                                ok = ok & (facing > 0) if side == FRONT or side == BACK + MIRRORED else ok & (facing < 0)
+                            ok = ok & (size(det) >= tiny)
+                            record(rays, i, first + q, (u * az + v * bz + w * cz) / det * inverse, ok, opacity)
+                            while late:
+                                settle(rays, i + lowest(late), first + q, table, q, axis, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
-            leaf = next_leaf(walk, tree)
+            leaf = next_leaf(walk, tree, table)
 
 
 @kernel
