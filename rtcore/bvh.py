@@ -20,7 +20,8 @@ class Tree(NamedTuple):
     """box (8 m, 8) float32 and link (8 m, 8) int32, the same memory: eight rows a node, a column a child, four cache lines in all.
 
     Rows 0 to 5 of a node, in `box`: low x, y, z and high x, y, z of the children in the tree's frame; where there is no child, a box inside
-    out, which nothing meets. Row 6, in `link`: a child's node, or for a leaf -1 - (8 first + count - 1) of its primitives. Row 7 is unused.
+    out, which nothing meets. Row 6, in `link`: a child's node, or for a leaf -1 - (8 first + count - 1) of its primitives. Row 7, in
+    `link`, for each octant of directions (bit k: part k is negative): the children from far to near, four bits each, then NO_CHILD.
     frame (4,) float64: center, scale. Node 0 is the root; a node comes after its parent.
     """
 
@@ -29,7 +30,8 @@ class Tree(NamedTuple):
     frame: np.ndarray
 
 
-NODE, LINK = 8, 6       # rows of a node, and which of them holds the links
+NODE, LINK, ORDER = 8, 6, 7     # rows of a node, and which of them hold the links and the orders
+NO_CHILD = 15
 EMPTY_TREE = Tree(np.zeros((0, WIDTH), np.float32), np.zeros((0, WIDTH), np.int32), np.zeros(4))
 NOWHERE = 2.0 ** 60     # low of a box inside out; times any inverse direction still a float32
 
@@ -41,7 +43,7 @@ def _split(low, high, leaf_most, box, link, order):
     """Fill box, link and order; returns the number of nodes."""
     n = low.shape[0]
     stack = np.empty((2 * (DEEPEST + 32), 4), np.int32)      # first, last, parent whose right child this is, depth
-    stack[0] = np.array([0, n, -1, 0], np.int32)
+    stack[0, 0], stack[0, 1], stack[0, 2], stack[0, 3] = 0, n, -1, 0
     top, nodes = 1, 0
     bin_low, bin_high = np.empty((BINS, 3)), np.empty((BINS, 3))
     count, cost = np.empty(BINS, np.int64), np.empty(BINS)
@@ -124,7 +126,7 @@ def _widen(box, link, wide, children):
     number of nodes; wide and children, as `Tree.box` and `Tree.link`, have room for as many as the binary tree has."""
     stack = np.empty((DEEPEST + 32) * WIDTH, np.int32)      # binary nodes that become wide ones
     slot = np.empty((DEEPEST + 32) * WIDTH, np.int32)       # where their number belongs: 8 parent + column
-    kids = np.empty(WIDTH, np.int32)
+    kids, key, rank = np.empty(WIDTH, np.int32), np.empty(WIDTH), np.empty(WIDTH, np.int64)
     stack[0], slot[0] = 0, -1
     top, nodes = 1, 0
     while top > 0:
@@ -152,6 +154,20 @@ def _widen(box, link, wide, children):
             for row in range(3):
                 wide[NODE * node + row, k], wide[NODE * node + 3 + row, k] = NOWHERE, -NOWHERE
             children[NODE * node + LINK, k] = -1
+        for octant in range(8):
+            for k in range(n):
+                b, key[k], rank[k] = kids[k], 0.0, k
+                for row in range(3):
+                    key[k] += (box[b, row] + box[b, 3 + row]) * (-1 if (octant >> row) & 1 else 1)
+                at = k
+                while at > 0 and key[rank[at - 1]] < key[k]:
+                    rank[at] = rank[at - 1]
+                    at -= 1
+                rank[at] = k
+            order = NO_CHILD << (4 * n)
+            for k in range(n):
+                order |= rank[k] << (4 * k)
+            children[NODE * node + ORDER, octant] = np.int32(order)
         for k in range(n):
             b = kids[k]
             for row in range(6):

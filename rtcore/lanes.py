@@ -84,7 +84,7 @@ def _as(ctx, b, value, have, want):
     return _splat(b, value) if isinstance(want, Lanes) else value
 
 
-def _math(b, name, *args):
+def llvm_math(b, name, *args):
     """An LLVM math intrinsic on scalars or vectors."""
     t = args[0].type
     scalar = t.element if isinstance(t, ir.VectorType) else t
@@ -105,7 +105,7 @@ def _vec3(ctx, b, t, parts):
 
 
 def _dot(b, p, q):
-    return _math(b, "fma", p[0], q[0], _math(b, "fma", p[1], q[1], b.fmul(p[2], q[2])))
+    return llvm_math(b, "fma", p[0], q[0], llvm_math(b, "fma", p[1], q[1], b.fmul(p[2], q[2])))
 
 
 # --- operators ---
@@ -164,25 +164,25 @@ _operator(operator.neg, [signature(v, v) for v in VECTORS],
 def fma(tc, x, y, z):
     """x·y + z rounded once. x, y, z: Lanes or numbers, at least one Lanes; or float64."""
     want = next((t for t in (x, y, z) if isinstance(t, Lanes)), types.float64)
-    return want(x, y, z), lambda ctx, b, sig, a: _math(b, "fma", *(_as(ctx, b, v, t, want) for v, t in zip(a, sig.args)))
+    return want(x, y, z), lambda ctx, b, sig, a: llvm_math(b, "fma", *(_as(ctx, b, v, t, want) for v, t in zip(a, sig.args)))
 
 
 @intrinsic
 def root(tc, x):
     """Square root, correctly rounded; NaN below 0."""
-    return x(x), lambda ctx, b, sig, a: _math(b, "sqrt", a[0])
+    return x(x), lambda ctx, b, sig, a: llvm_math(b, "sqrt", a[0])
 
 
 @intrinsic
 def size(tc, x):
     """|x|."""
-    return x(x), lambda ctx, b, sig, a: _math(b, "fabs", a[0])
+    return x(x), lambda ctx, b, sig, a: llvm_math(b, "fabs", a[0])
 
 
 @intrinsic
 def with_sign(tc, x, y):
     """|x| with the sign of y."""
-    return x(x, x), lambda ctx, b, sig, a: _math(b, "copysign", *a)
+    return x(x, x), lambda ctx, b, sig, a: llvm_math(b, "copysign", *a)
 
 
 @intrinsic
@@ -232,37 +232,10 @@ def any_lane(tc, mask):
     return types.boolean(mask), lambda ctx, b, sig, a: b.icmp_unsigned("!=", b.bitcast(a[0], I8), I8(0))
 
 
-def _reduced(name):
-    def make(tc, x):
-        suffix = "v8f32" if x == F32 else "v8f64"
-
-        def gen(ctx, b, sig, a):
-            t = ir.FunctionType(REAL[x.elem], [a[0].type])
-            return b.call(cgutils.get_or_insert_function(b.module, t, f"llvm.vector.reduce.{name}.{suffix}"), a)
-        return x.elem(x), gen
-    return make
-
-
 @intrinsic
-def smallest(tc, x):
-    """The smallest of the eight, a number."""
-    return _reduced("fmin")(tc, x)
-
-
-@intrinsic
-def largest(tc, x):
-    """The largest of the eight, a number."""
-    return _reduced("fmax")(tc, x)
-
-
-@intrinsic
-def lowest_bit(tc, number):
-    """Number of the lowest bit that is set in an int64 other than 0."""
-    def gen(ctx, b, sig, a):
-        t = ir.IntType(64)
-        count = cgutils.get_or_insert_function(b.module, ir.FunctionType(t, [t, ir.IntType(1)]), "llvm.cttz.i64")
-        return b.call(count, [a[0], ir.Constant(ir.IntType(1), 1)])
-    return types.int64(types.int64), gen
+def zero(tc, x):
+    """Zeros of the type of the lanes x."""
+    return x(x), lambda ctx, b, sig, a: ir.Constant(a[0].type, [0.0] * LANES)
 
 
 @intrinsic
@@ -316,7 +289,7 @@ def cross(tc, p, q):
     def gen(ctx, b, sig, a):
         u, v = _parts(ctx, b, p, a[0]), _parts(ctx, b, q, a[1])
         turns = ((1, 2), (2, 0), (0, 1))
-        return _vec3(ctx, b, p, [_math(b, "fma", u[j], v[k], b.fneg(b.fmul(u[k], v[j]))) for j, k in turns])
+        return _vec3(ctx, b, p, [llvm_math(b, "fma", u[j], v[k], b.fneg(b.fmul(u[k], v[j]))) for j, k in turns])
     return p(p, q), gen
 
 
@@ -324,13 +297,13 @@ def cross(tc, p, q):
 def along(tc, p, t, d):
     """p + t·d, each part fused. t: the vectors' part type."""
     def gen(ctx, b, sig, a):
-        return _vec3(ctx, b, p, [_math(b, "fma", a[1], v, u) for u, v in zip(_parts(ctx, b, p, a[0]), _parts(ctx, b, d, a[2]))])
+        return _vec3(ctx, b, p, [llvm_math(b, "fma", a[1], v, u) for u, v in zip(_parts(ctx, b, p, a[0]), _parts(ctx, b, d, a[2]))])
     return p(p, t, d), gen
 
 
 # --- memory ---
 
-def _at(ctx, b, sig, args, elem, width):
+def place_of(ctx, b, sig, args, elem, width):
     """Pointer to `width` elements at [row, column] of a C-contiguous 2-D array, or at [i] of a 1-D one."""
     array = ctx.make_array(sig.args[0])(ctx, b, args[0])
     index = args[1]
@@ -345,7 +318,7 @@ def _at(ctx, b, sig, args, elem, width):
 def load(tc, array, row, i):
     """Eight floats array[row, i .. i+7] of a C-contiguous array (rows, n)."""
     v = LANES_OF[array.dtype]
-    return v(array, types.intp, types.intp), lambda ctx, b, sig, a: b.load(_at(ctx, b, sig, a, REAL[v.elem], LANES), align=4)
+    return v(array, types.intp, types.intp), lambda ctx, b, sig, a: b.load(place_of(ctx, b, sig, a, REAL[v.elem], LANES), align=4)
 
 
 @intrinsic
@@ -355,7 +328,7 @@ def load3(tc, array, row, i):
 
     def gen(ctx, b, sig, a):
         rows = [b.add(a[1], ir.Constant(a[1].type, k)) for k in range(3)]
-        return _vec3(ctx, b, Vec3(v), [b.load(_at(ctx, b, sig, (a[0], r, a[2]), REAL[v.elem], LANES), align=4) for r in rows])
+        return _vec3(ctx, b, Vec3(v), [b.load(place_of(ctx, b, sig, (a[0], r, a[2]), REAL[v.elem], LANES), align=4) for r in rows])
     return Vec3(v)(array, types.intp, types.intp), gen
 
 
@@ -365,7 +338,7 @@ def splat3(tc, array, p, k):
     v = LANES_OF[array.dtype]
 
     def gen(ctx, b, sig, a):
-        start = _at(ctx, b, sig, a, REAL[v.elem], 1)
+        start = place_of(ctx, b, sig, a, REAL[v.elem], 1)
         return _vec3(ctx, b, Vec3(v), [_splat(b, b.load(b.gep(start, [I32(j)]))) for j in range(3)])
     return Vec3(v)(array, types.intp, types.intp), gen
 
@@ -374,16 +347,25 @@ def splat3(tc, array, p, k):
 def store(tc, array, row, i, x):
     """array[row, i .. i+7] = x."""
     def gen(ctx, b, sig, a):
-        b.store(a[3], _at(ctx, b, sig, a, REAL[x.elem], LANES), align=4)
+        b.store(a[3], place_of(ctx, b, sig, a, REAL[x.elem], LANES), align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, types.intp, x), gen
+
+
+@intrinsic
+def fill(tc, array, i, number):
+    """array[i .. i+7] = number; int32 array."""
+    def gen(ctx, b, sig, a):
+        b.store(_splat(b, b.trunc(a[2], I32)), place_of(ctx, b, sig, a, I32, LANES), align=4)
+        return ctx.get_dummy_value()
+    return types.void(array, types.intp, types.intp), gen
 
 
 @intrinsic
 def exceeds(tc, array, i, number):
     """Mask of the lanes where the int32 array[i + lane] > number."""
     def gen(ctx, b, sig, a):
-        ids = b.load(_at(ctx, b, sig, a, I32, LANES), align=4)
+        ids = b.load(place_of(ctx, b, sig, a, I32, LANES), align=4)
         return b.icmp_signed(">", ids, _splat(b, b.trunc(a[2], I32)))
     return MASK(array, types.intp, types.intp), gen
 
@@ -392,7 +374,7 @@ def exceeds(tc, array, i, number):
 def store_where(tc, array, i, mask, number):
     """array[i + lane] = number in the lanes of the mask; int32 array."""
     def gen(ctx, b, sig, a):
-        p = _at(ctx, b, sig, a, I32, LANES)
+        p = place_of(ctx, b, sig, a, I32, LANES)
         b.store(b.select(a[2], _splat(b, b.trunc(a[3], I32)), b.load(p, align=4)), p, align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, mask, types.intp), gen
@@ -402,7 +384,7 @@ def store_where(tc, array, i, mask, number):
 def add_where(tc, array, i, mask, number):
     """array[i + lane] += number in the lanes of the mask; int32 array."""
     def gen(ctx, b, sig, a):
-        p = _at(ctx, b, sig, a, I32, LANES)
+        p = place_of(ctx, b, sig, a, I32, LANES)
         zero = ir.Constant(ir.VectorType(I32, LANES), [0] * LANES)
         b.store(b.add(b.load(p, align=4), b.select(a[2], _splat(b, b.trunc(a[3], I32)), zero)), p, align=4)
         return ctx.get_dummy_value()

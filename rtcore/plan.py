@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.lights import AIMS, STUDIO, Ambient
+from rtcore.lights import SHINE, STUDIO, Ambient
 from rtcore.scene import Leaf, Light, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL, KINDS
@@ -87,7 +87,7 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
               "adaptive": "further samples" in stages and (settings.adaptive or VIEW[settings.view].needs_error)}
     names = [name for name, needed in wanted.items() if needed]
-    assert all(type(light) in AIMS for light in lights)
+    assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, settings.samples if lit else 1)
 

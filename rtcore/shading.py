@@ -10,7 +10,7 @@ import numpy as np
 from rtcore.jit import inline, kernel
 from rtcore.scene import Background, Leaf, Material, invertible
 from rtcore.shapes.kind import normalized
-from rtcore.wave import (AIM_REACH, AIM_STRENGTH, DEPTH_UNIT, DX, DY, DZ, ERR, GX, GY, GZ, NX, NY, NZ, OPAQUE, PX, PY, PZ, finish, put_ray)
+from rtcore.wave import DEPTH_UNIT, DX, DY, DZ, ERR, GLOSS, GX, GY, GZ, NX, NY, NZ, OPAQUE, POLISH, PX, PY, PZ, finish, put_ray
 
 # columns of Look.material
 (COLOR, AMBIENT, DIFFUSE, SPECULAR, SHININESS, REFLECTION, TRANSMISSION, IOR, FRESNEL, TINT, EMISSION, CHECKER, EVEN, ODD,
@@ -93,9 +93,10 @@ def _faced(rays, surface, i):
 
 
 @kernel
-def glow(wave, n, look):
-    """Light without lights: the background, emission, and the ambient light returned. Fog comes later: fade becomes 1."""
-    rays, m, b = wave.rays, look.material, look.backdrop
+def glow(wave, n, look, answer):
+    """Light without lights: the background, emission, and the ambient light returned; and, for lights to come, `Beam.answer` if it has
+    room. Fog comes later: fade becomes 1."""
+    rays, m, b, lit = wave.rays, look.material, look.backdrop, answer.shape[1] > 0
     for i in range(n):
         wave.fade[i] = 1
         p = rays.prim[i]
@@ -110,59 +111,31 @@ def glow(wave, n, look):
         wave.light[0, i] = m[row, EMISSION] + share * r * look.ambient[0]
         wave.light[1, i] = m[row, EMISSION + 1] + share * g * look.ambient[1]
         wave.light[2, i] = m[row, EMISSION + 2] + share * b_ * look.ambient[2]
+        if lit:
+            diffuse = m[row, DIFFUSE]
+            answer[0, i], answer[1, i], answer[2, i] = diffuse * r, diffuse * g, diffuse * b_
+            answer[GLOSS, i], answer[POLISH, i] = m[row, SPECULAR], m[row, SHININESS]
 
 
 @kernel
-def light_up(wave, n, look, color, beam):
-    """The shadow rays from the wave's hits toward a light that `beam.aim` tells of, and what each would bring; returns their number.
-    None starts from a surface that faces away, or that answers no light."""
-    rays, surface, m, aim = wave.rays, wave.surface, look.material, beam.aim
-    count = 0
-    for i in range(n):
-        p = rays.prim[i]
-        if p < 0:
-            continue
-        row = look.of[p]
-        diffuse, specular, strength = m[row, DIFFUSE], m[row, SPECULAR], np.float64(aim[AIM_STRENGTH, i])
-        if strength == 0 or (diffuse == 0 and specular == 0):
-            continue
-        gx, gy, gz, nx, ny, nz, _ = _faced(rays, surface, i)
-        x, y, z = np.float64(aim[0, i]), np.float64(aim[1, i]), np.float64(aim[2, i])
-        lx, ly, lz = normalized(x, y, z)
-        cosine = nx * lx + ny * ly + nz * lz
-        if cosine <= 0 or gx * lx + gy * ly + gz * lz <= 0:
-            continue
-        r, g, b = _color(m, row, surface, i)
-        highlight = 0.0
-        if specular > 0:
-            hx, hy, hz = normalized(lx - rays.ray[DX, i], ly - rays.ray[DY, i], lz - rays.ray[DZ, i])
-            highlight = specular * max(nx * hx + ny * hy + nz * hz, 0.0) ** m[row, SHININESS]
-        beam.bring[0, count] = strength * color[0] * (r * diffuse * cosine + highlight)
-        beam.bring[1, count] = strength * color[1] * (g * diffuse * cosine + highlight)
-        beam.bring[2, count] = strength * color[2] * (b * diffuse * cosine + highlight)
-        beam.owner[count] = i
-        err = surface[ERR, i]
-        put_ray(beam.rays, count, surface[PX, i] + err * gx, surface[PY, i] + err * gy, surface[PZ, i] + err * gz, x, y, z,
-                aim[AIM_REACH, i])
-        count += 1
-    finish(beam.rays, count)
-    return count
-
-
-@kernel
-def gather(wave, beam, count):
-    """Add what the beam brings where nothing opaque is in the way; returns how many rays met something opaque."""
-    blocked = 0
-    for j in range(count):
-        if beam.rays.prim[j] >= 0:
+def gather(wave, beam, n):
+    """Add what the beam's n rays bring where nothing opaque is in the way; returns how many met something opaque."""
+    rays, blocked = beam.rays, 0
+    for j in range(n):
+        if rays.prim[j] >= 0:
             blocked += 1
             continue
-        depth = beam.rays.depth[j]
+        i, depth = beam.owner[j], rays.depth[j]
         through = 1.0 if depth == 0 else np.exp(-depth * DEPTH_UNIT)
-        i = beam.owner[j]
         for k in range(3):
             wave.light[k, i] += through * beam.bring[k, j]
     return blocked
+
+
+@kernel
+def close(rays, n):
+    """Let nothing but the first n rays be traced."""
+    finish(rays, n)
 
 
 @inline

@@ -9,14 +9,16 @@ import numpy as np
 from rtcore import film as films, fog as fogs, shading
 from rtcore.eye import cast, cast_list
 from rtcore.flatten import Geometry, nbytes
-from rtcore.lights import AIMS
+from rtcore.lanes import LANES
+from rtcore.lights import SHINE
 from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
-from rtcore.wave import Wave, new_beam, new_wave
+from rtcore.wave import NO_ANSWER, Wave, new_beam, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
+SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
 
 #: Columns of Scratch.counts.
 COUNTS = ("reflection", "refraction", "primary", "primary_hits", "shadow", "shadow_hits", "nonfinite")
@@ -27,7 +29,7 @@ class Lamp(NamedTuple):
     """A light, ready for its kernel."""
 
     name: str               # "point"
-    aim: Callable
+    shine: Callable
     numbers: np.ndarray
     color: np.ndarray
 
@@ -59,7 +61,7 @@ class Scratch:
         self.clock = Clock()
         self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
         self.waves: list[Wave] = []
-        self.beam = new_beam(0, dtype)
+        self.beam = new_beam(0, 0, dtype)
         self.target = np.zeros(0, np.int32)
         self.sample = np.zeros((3, 0), np.float32)
 
@@ -87,11 +89,11 @@ class Scratch:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
         return sum((wave.rays.tally for wave in self.waves), self.tallied + self.beam.rays.tally)
 
-    def beams(self, n: int):
-        """A beam with room for n shadow rays."""
-        if self.beam.owner.shape[0] < n:
+    def beams(self, n: int, lights: int):
+        """A beam with room for shadow rays from n hits toward so many lights."""
+        if self.beam.answer.shape[1] < n or self.beam.owner.shape[0] < padded(n) * lights + LANES:
             self.tallied += self.beam.rays.tally
-            self.beam = new_beam(n * 5 // 4, self.dtype)
+            self.beam = new_beam(n * 5 // 4, lights, self.dtype)
         return self.beam
 
 
@@ -101,7 +103,7 @@ class Tracer:
     def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, up, background: Background, fog: Fog | None):
         self.geometry, self.plan, self.settings, self.view = geometry, plan, settings, view
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
-        self.lamps = [Lamp(type(light).__name__.lower(), AIMS[type(light)], light.numbers(), np.multiply(light.color, light.intensity))
+        self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity))
                       for light in plan.lights]
         self.fog = fogs.numbers(fog) if plan.fog else None
 
@@ -176,23 +178,26 @@ class Tracer:
 
     def _light(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray) -> None:
         clock = scratch.clock
-        shading.glow(wave, n, self.look)
-        clock.lap(GLOW, "glow")
         if not self.lamps:
+            shading.glow(wave, n, self.look, NO_ANSWER)
+            clock.lap(GLOW, "glow")
             return
-        beam = scratch.beams(n)
-        for lamp in self.lamps:
-            stage = f"light: {lamp.name}"
-            lamp.aim(wave, n, lamp.numbers, beam.aim)
-            clock.lap(stage, f"light-{lamp.name}")
-            m = shading.light_up(wave, n, self.look, lamp.color, beam)
-            clock.lap(stage, "lit")
+        together = min(max(SHADOW_RAYS // n, 1), len(self.lamps))
+        beam = scratch.beams(n, together)
+        shading.glow(wave, n, self.look, beam.answer)
+        clock.lap(GLOW, "glow")
+        for lamps in (self.lamps[k:k + together] for k in range(0, len(self.lamps), together)):
+            m = 0
+            for lamp in lamps:
+                m = lamp.shine(wave, n, lamp.numbers, lamp.color, beam, m)
+                clock.lap(f"light: {lamp.name}", f"light-{lamp.name}")
             if m == 0:
                 continue
             if self.plan.shadows:
+                shading.close(beam.rays, m)
                 for group in self.geometry.groups:
                     group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
                     clock.lap("shadow rays", group.kind.name)
                 counts[SHADOW] += m
             counts[SHADOW_HITS] += shading.gather(wave, beam, m)
-            clock.lap(stage, "lit")
+            clock.lap(f"light: {lamps[0].name}", "lit")

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.bvh import LINK, NODE, STACK, WIDTH
+from rtcore.across import largest, lowest_bit, smallest
+from rtcore.bvh import LINK, NO_CHILD, NODE, ORDER, STACK, WIDTH
 from rtcore.jit import inline, inline_new
-from rtcore.lanes import (along, any_lane, bits, fma, greatest, largest, least, load, load3, lowest_bit, narrow, select, size,
-                          smallest, splat, store, vec3, with_sign)
+from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, load3, narrow, select, size, splat, store, vec3, with_sign)
 from rtcore.turns import prefetch_either, push
 from rtcore.wave import DX, OX, START, T
 
@@ -27,10 +27,10 @@ TINY = 2.0 ** -60       # a direction's part that counts as 0
 
 # rows of Walk.coarse: 1/direction, offsets of low and of high planes, reach, direction, origin
 INVERSE, LOWS, HIGHS, REACH, WAY, FROM = 0, 3, 6, 9, 10, 13
-# places in Walk.state
-TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING = range(7)
-BEAM, SINGLY, VECTORS = range(3)    # state[MODE]: the pyramid around all rays, each ray on its own, vectors of rays without a pyramid
-SLOTS = 8               # rays walked in turns
+# places in Walk.state; nodes are eight rows and eight children, so that places are told by shifts
+TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING, OCTANT = range(8)
+BEAM, SINGLY, VECTORS = range(3)    # state[MODE]: a pyramid around all rays, each ray on its own, vectors without a pyramid
+SLOTS = 8               # rays walked in turns; a power of two
 # places in Walk.beam: over all rays the least and the largest origin and slope (the step for a step along the main axis), the main axis'
 # direction, how far any ray still reaches, and what to add to a plane for its earliest entry and latest exit
 BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6, 9, 12, 13, 14, 15
@@ -62,7 +62,7 @@ def new_walk(rays):
     coarse = np.empty((16, PACKET), np.float32)
     return Walk(coarse, np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32), coarse.view(np.int32),
                 np.empty((SLOTS, STACK + WIDTH), np.int64), np.empty((1, STACK), np.int32), np.empty((1, STACK), np.float32),
-                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(7, np.int64))
+                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(8, np.int64))
 
 
 @inline
@@ -139,9 +139,9 @@ def begin(walk, rays, start, n, tree, singly):
                 for k in range(SLOTS):
                     walk.slots[k, 0], walk.slots[k, 1] = 0, 0
             else:
+                some = lowest_bit(waiting)
                 state[MODE] = VECTORS
-                for k in range(3):
-                    walk.beam[SLOPE_FROM + k] = coarse[WAY + k, lowest_bit(waiting)]
+                state[OCTANT] = (coarse[WAY, some] < 0) + 2 * (coarse[WAY + 1, some] < 0) + 4 * (coarse[WAY + 2, some] < 0)
         walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP] = -1, 0, alive, 1
 
 
@@ -231,13 +231,13 @@ def only_ray(walk):
 @inline
 def leaf_first(leaf):
     """The leaf's first primitive."""
-    return leaf // WIDTH
+    return leaf >> 3
 
 
 @inline
 def leaf_end(leaf):
     """The primitive after the leaf's last."""
-    return leaf // WIDTH + leaf % WIDTH + 1
+    return (leaf >> 3) + (leaf & 7) + 1
 
 
 @inline
@@ -247,7 +247,7 @@ def _next_of_ray(walk, tree, table):
     box, link = tree.box, tree.link
     slot, running, waiting = state[TOP], state[RUNNING], state[WAITING]
     while running > 0:
-        slot = (slot + 1) % SLOTS
+        slot = (slot + 1) & (SLOTS - 1)
         ray, top = slots[slot, 0], slots[slot, 1]
         if top == 0:
             if ray < 0:
@@ -277,7 +277,7 @@ def _next_of_ray(walk, tree, table):
         x0, x1 = (0, 3) if ix > 0 else (3, 0)
         y0, y1 = (1, 4) if iy > 0 else (4, 1)
         z0, z1 = (2, 5) if iz > 0 else (5, 2)
-        row = NODE * node
+        row = node << 3
         x = fma(load(box, row + x0, 0), ix, coarse[LOWS + x0, ray])
         y = fma(load(box, row + y0, 0), iy, coarse[LOWS + y0, ray])
         z = fma(load(box, row + z0, 0), iz, coarse[LOWS + z0, ray])
@@ -308,36 +308,37 @@ def _next_of_packet(walk, tree):
         if bundled and not entry[0, top] <= farthest:
             continue
         if place >= 0:
-            k = (place >> 1) % WIDTH
-            row = NODE * (place // (2 * WIDTH))
+            k = (place >> 1) & 7
+            row = (place >> 4) << 3
             node = np.int64(link[row + LINK, k])
-            if node < 0 or place % 2 == 0:
+            if node < 0 or place & 1 == 0:
                 waiting = _met_by(coarse, waiting, box, row, k)
                 if waiting == 0:
                     continue
                 if node < 0:
                     state[TOP], state[ACTIVE] = top, waiting
                     return -1 - node
-        row = NODE * node
-        if bundled:
-            enter = greatest(fma(load(box, row + main0, 0), sign, beam[ENTER]), np.float32(0))
-            leave = least(fma(load(box, row + main1, 0), sign, beam[LEAVE]), farthest)
-            s0, s1 = beam[SLOPE_FROM + p], beam[SLOPE_TO + p]
-            low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + p]
-            high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + p]
-            a, b = load(box, row + p, 0), load(box, row + p + 3, 0)
-            ok, narrower = (enter <= leave) & (low <= b) & (high >= a), high - low <= b - a
-            s0, s1 = beam[SLOPE_FROM + q], beam[SLOPE_TO + q]
-            low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + q]
-            high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + q]
-            a, b = load(box, row + q, 0), load(box, row + q + 3, 0)
-            met, sure = bits(ok & (low <= b) & (high >= a)), bits(narrower & (high - low <= b - a))
-            store(near, 0, 0, enter)
-        else:
-            l0, l1, l2 = load(box, row, 0), load(box, row + 1, 0), load(box, row + 2, 0)
-            h0, h1, h2 = load(box, row + 3, 0), load(box, row + 4, 0), load(box, row + 5, 0)
-            met, sure = bits(l0 <= h0), 0
-            store(near, 0, 0, fma(l0 + h0, beam[SLOPE_FROM], fma(l1 + h1, beam[SLOPE_FROM + 1], (l2 + h2) * beam[SLOPE_FROM + 2])))
+        row = node << 3
+        if not bundled:
+            order = np.int64(link[row + ORDER, state[OCTANT]]) & 0xFFFFFFFF | NO_CHILD << 32      # eight leave no room for the end
+            while order & 15 != NO_CHILD:
+                stack[0, top], mask[top] = (node << 4) + 2 * (order & 15), waiting
+                order >>= 4
+                top += 1
+            continue
+        enter = greatest(fma(load(box, row + main0, 0), sign, beam[ENTER]), np.float32(0))
+        leave = least(fma(load(box, row + main1, 0), sign, beam[LEAVE]), farthest)
+        s0, s1 = beam[SLOPE_FROM + p], beam[SLOPE_TO + p]
+        low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + p]
+        high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + p]
+        a, b = load(box, row + p, 0), load(box, row + p + 3, 0)
+        ok, narrower = (enter <= leave) & (low <= b) & (high >= a), high - low <= b - a
+        s0, s1 = beam[SLOPE_FROM + q], beam[SLOPE_TO + q]
+        low = least(s0 * enter, s0 * leave) + beam[BEAM_FROM + q]
+        high = greatest(s1 * enter, s1 * leave) + beam[BEAM_TO + q]
+        a, b = load(box, row + q, 0), load(box, row + q + 3, 0)
+        met, sure = bits(ok & (low <= b) & (high >= a)), bits(narrower & (high - low <= b - a))
+        store(near, 0, 0, enter)
         base = top
         while met:
             k = lowest_bit(met)
@@ -346,7 +347,7 @@ def _next_of_packet(walk, tree):
             while there > base and entry[0, there - 1] < at:
                 entry[0, there], stack[0, there] = entry[0, there - 1], stack[0, there - 1]
                 there -= 1
-            entry[0, there], stack[0, there], mask[top] = at, 2 * (WIDTH * node + k) + ((sure >> k) & 1), waiting
+            entry[0, there], stack[0, there], mask[top] = at, (node << 4) + 2 * k + ((sure >> k) & 1), waiting
             top += 1
     state[TOP] = 0
     return -1

@@ -12,13 +12,13 @@ import numpy as np
 from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
-from rtcore.lights import AIMS
+from rtcore.lights import SHINE
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
 from rtcore.trace import CLOSEST, COUNTS
-from rtcore.wave import new_beam, new_rays, new_wave
+from rtcore.wave import NO_ANSWER, new_beam, new_rays, new_wave
 
 
 def _wave(dtype):
@@ -44,7 +44,7 @@ def _core(dtype):
 
 def _glow(dtype):
     wave, _, n = _wave(dtype)
-    shading.glow(wave, n, _look())
+    shading.glow(wave, n, _look(), NO_ANSWER)
     films.deposit(wave, n, np.zeros((3, 64), np.float32))
 
 
@@ -84,8 +84,8 @@ def _rows(dtype):
 
 def _lit(dtype):
     wave, _, n = _wave(dtype)
-    beam = new_beam(n, dtype)
-    shading.light_up(wave, n, _look(), np.ones(3), beam)
+    beam = new_beam(n, 1, dtype)
+    shading.close(beam.rays, 0)
     shading.gather(wave, beam, 0)
 
 
@@ -102,7 +102,7 @@ def _bounce(dtype):
 def _light(kind):
     def compile_light(dtype):
         wave, _, n = _wave(dtype)
-        AIMS[kind](wave, n, np.zeros(4), new_beam(n, dtype).aim)
+        SHINE[kind](wave, 0, np.zeros(4), np.zeros(3), new_beam(n, 1, dtype), 0)
     return compile_light
 
 
@@ -123,7 +123,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
     "adaptive": ("rtcore.adaptive", _adaptive),
-    **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in AIMS},
+    **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
 }
 ALL = tuple(f"{name}.{precision}" for precision in DTYPES for name in GROUPS)

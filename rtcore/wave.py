@@ -113,15 +113,17 @@ class Wave(NamedTuple):
 
 
 class Beam(NamedTuple):
-    """Rays from hit points toward one light, with what they would bring if nothing were in the way."""
+    """Rays from a wave's hits toward lights, with what they would bring if nothing were in the way."""
 
     rays: Rays
-    aim: np.ndarray         # P (5, n), a column a ray of the lit wave: way to the light, t of the light, strength
-    bring: np.ndarray       # float32 (3, n), a column a shadow ray
-    owner: np.ndarray       # int32 (n): the column of the lit wave
+    bring: np.ndarray       # float32 (3, columns)
+    owner: np.ndarray       # int32 (columns): the column of the lit wave
+    answer: np.ndarray      # float32 (5, n), a column a hit: what it returns of a light, as named below
 
 
-AIM_REACH, AIM_STRENGTH = 3, 4
+# rows of Beam.answer: diffuse red, green and blue; specular and its exponent
+GLOSS, POLISH, ANSWER_ROWS = 3, 4, 5
+NO_ANSWER = np.zeros((ANSWER_ROWS, 0), np.float32)      # where there is no light to answer
 
 
 def new_wave(n: int, dtype) -> Wave:
@@ -132,11 +134,11 @@ def new_wave(n: int, dtype) -> Wave:
                 np.empty(n, np.float32), np.empty(n, np.int32))
 
 
-def new_beam(n: int, dtype) -> Beam:
-    """A beam for `n` rays, with nothing set."""
-    rays = new_rays(n, dtype)
-    n = rays.ray.shape[1]
-    return Beam(rays, np.empty((5, n), dtype), np.empty((3, n), np.float32), np.empty(n, np.int32))
+def new_beam(n: int, lights: int, dtype) -> Beam:
+    """A beam with room for rays from `n` hits toward so many lights, with nothing set."""
+    n, columns = padded(n), padded(n) * lights + LANES
+    return Beam(new_rays(columns, dtype), np.empty((3, columns), np.float32), np.empty(columns, np.int32),
+                np.empty((ANSWER_ROWS, n), np.float32))
 
 
 @inline

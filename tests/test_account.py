@@ -86,11 +86,11 @@ print(*sorted(loaded_kernels()))
 
 
 @pytest.mark.parametrize("fields,settings,wanted,unwanted", [
-    ("lights=[]", "", {"shapes.sphere.intersect", "eye.cast"}, {"shading.light_up", "shading.bounce", "fog.dim", "lights.point.aim"}),
-    ("lights=[rtcore.Point(position=(0, 9, 0))], fog=rtcore.Fog()", "fog=False", {"shading.light_up", "lights.point.aim"},
-     {"fog.dim", "lights.directional.aim"}),
+    ("lights=[]", "", {"shapes.sphere.intersect", "eye.cast"}, {"shading.gather", "shading.bounce", "fog.dim", "lights.point.shine"}),
+    ("lights=[rtcore.Point(position=(0, 9, 0))], fog=rtcore.Fog()", "fog=False", {"shading.gather", "lights.point.shine"},
+     {"fog.dim", "lights.directional.shine"}),
     ("lights=[rtcore.Point(position=(0, 9, 0))], fog=rtcore.Fog()", "view='normal'", {"shapes.sphere.surface"},
-     {"shading.light_up", "shading.glow", "fog.dim"})])
+     {"shading.gather", "shading.glow", "fog.dim"})])
 def test_a_scene_of_spheres_loads_no_kernel_that_it_does_not_need(fields, settings, wanted, unwanted):
     run = subprocess.run([sys.executable, "-c", LOADED.format(fields=fields, settings=settings)], capture_output=True, text=True, cwd=ROOT,
                          timeout=280)

@@ -65,7 +65,7 @@ def first_hits(geometry, matrix, rng, far: float):
 
 
 def spawn(surface, side, rng, dtype):
-    """As `shading.light_up` and `bounce` do: the point moved by ERR along the normal, toward `side`; cosine distributed, or all but
+    """As `lights._shine` and `shading.bounce` do: the point moved by ERR along the normal, toward `side`; cosine distributed, or all but
     level with the surface."""
     n = surface.shape[1]
     normal = surface[GX:GX + 3].astype(float) * side

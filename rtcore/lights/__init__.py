@@ -1,4 +1,4 @@
-"""Lights: one file each, with the authoring record and, unless it is everywhere, the kernel that aims at it. Listed once, here."""
+"""Lights: one file each, with the authoring record and, unless it is everywhere, the kernel for its shadow rays. Listed once, here."""
 from rtcore.lights import directional, point
 from rtcore.lights.ambient import Ambient
 from rtcore.lights.directional import Directional
@@ -6,8 +6,8 @@ from rtcore.lights.point import Point
 
 LIGHTS = (Point, Directional, Ambient)
 
-#: The aiming kernel of each light that casts shadows.
-AIMS = {Point: point.aim, Directional: directional.aim}
+#: The kernel of each light that casts shadows.
+SHINE = {Point: point.shine, Directional: directional.shine}
 
 #: What lights a scene that names no lights: a key light from above and the left of someone who looks along z, and a soft fill.
 STUDIO = (Directional(direction=(-0.5, -1.0, 0.7), intensity=0.9, name="key"), Ambient(intensity=0.25, name="fill"))

@@ -5,8 +5,9 @@ import numpy as np
 
 from rtcore.fields import Vec, Vector
 from rtcore.jit import kernel
+from rtcore.lanes import LANES, vec3, zero
+from rtcore.lights._shine import hit_points, shine_on
 from rtcore.scene import Light
-from rtcore.wave import AIM_REACH, AIM_STRENGTH
 
 
 class Directional(Light, frozen=True, kw_only=True):
@@ -15,16 +16,15 @@ class Directional(Light, frozen=True, kw_only=True):
     direction: Annotated[Vec, Vector(nonzero=True, help="the way the light travels")]
 
     def numbers(self) -> np.ndarray:
-        """What `aim` needs: the unit vector toward the light."""
+        """What `shine` needs: the unit vector toward the light."""
         toward = -np.array(self.direction) / np.abs(self.direction).max()
         return toward / np.linalg.norm(toward)
 
 
 @kernel
-def aim(wave, n, numbers, out):
-    """Rows of Beam.aim for the rays of the wave that hit something: the way to the light has no end."""
-    for i in range(n):
-        if wave.rays.prim[i] >= 0:
-            out[0, i], out[1, i], out[2, i] = numbers[0], numbers[1], numbers[2]
-            out[AIM_REACH, i] = np.inf
-            out[AIM_STRENGTH, i] = 1.0
+def shine(wave, n, light, color, beam, first):
+    """As that of a point light, but the way to the light has no end."""
+    for i in range(0, n, LANES):
+        none = zero(hit_points(wave, i).x)
+        first += shine_on(wave, i, beam, first, color, vec3(none + light[0], none + light[1], none + light[2]), none + np.inf, none + 1)
+    return first

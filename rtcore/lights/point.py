@@ -5,8 +5,9 @@ import numpy as np
 
 from rtcore.fields import Choice, Vec, Vector
 from rtcore.jit import kernel
+from rtcore.lanes import LANES, select, vec3, zero
+from rtcore.lights._shine import hit_points, shine_on
 from rtcore.scene import Light
-from rtcore.wave import AIM_REACH, AIM_STRENGTH, PX, PY, PZ
 
 
 class Point(Light, frozen=True, kw_only=True):
@@ -17,19 +18,19 @@ class Point(Light, frozen=True, kw_only=True):
     falloff: Annotated[str, Choice(words=("inverse-square", "constant"), help="how the light weakens with distance")] = "inverse-square"
 
     def numbers(self) -> np.ndarray:
-        """What `aim` needs: position, whether it falls off."""
+        """What `shine` needs: position, whether it falls off."""
         return np.array([*self.position, float(self.falloff == "inverse-square")])
 
 
 @kernel
-def aim(wave, n, numbers, out):
-    """Rows of Beam.aim for the rays of the wave that hit something: the way to the light ends on it at t = 1."""
-    surface = wave.surface
-    for i in range(n):
-        if wave.rays.prim[i] >= 0:
-            x, y, z = numbers[0] - surface[PX, i], numbers[1] - surface[PY, i], numbers[2] - surface[PZ, i]
-            square = x * x + y * y + z * z
-            out[0, i], out[1, i], out[2, i] = x, y, z
-            out[AIM_REACH, i] = 1.0
-            # a surface that contains the light is not lit by it
-            out[AIM_STRENGTH, i] = 0.0 if square == 0 else 1.0 / square if numbers[3] != 0 else 1.0
+def shine(wave, n, light, color, beam, first):
+    """Shadow rays from the hits of the wave toward a light, whose way ends on it at t = 1, and what they would bring, into the columns from
+    `first` on; returns the column after the last."""
+    for i in range(0, n, LANES):
+        hit = hit_points(wave, i)
+        x, y, z = light[0] - hit.x, light[1] - hit.y, light[2] - hit.z
+        square = x * x + y * y + z * z
+        # a surface that contains the light is not lit by it
+        strength = select(square > 0, 1 / square if light[3] != 0 else 1 + zero(square), 0)
+        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 + zero(square), strength)
+    return first

@@ -72,11 +72,10 @@ def polish(f, f1, v, v1, s, radius, radius1, far, speed):
 
 
 @inline
-def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, side, like):
+def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, side, like, where):
     """Where the lanes `todo` first cross a ball between start and end; `near` is what `closest` gave. Returns s, the lanes that found
     it, and those for which this arithmetic isn't certain. What comes after the start is told once s is rounded to the type of `like`.
-
-    No array may come in here: numba counts references to those that a function with branches is given, in the hottest of loops.
+    Unless it matters `where`, as it doesn't to shadow rays, an s well between start and end is good enough as plain arithmetic gives it.
     """
     inverse, middle, off, fuzz = near
     sure = off > 1024 * fuzz
@@ -91,15 +90,23 @@ def choose(todo, near, f, f1, v, v1, radius, radius1, far, speed, start, end, si
     if side & BACK == 0:
         enter = select(outer > 0, inner, outer)      # outer, not middle: that may be 0 of either sign
         todo = todo & (enter - slack < end)
+        if not where:
+            found = todo & (enter - slack > start) & (enter + slack < end)
+            s = enter
+            todo = todo & ~found
         want = todo & (enter + slack > start)
         if any_lane(want):
-            s, slope, left = polish(f, f1, v, v1, enter, radius, radius1, far, speed)
-            ok = certain(s, slope, left, start, end)
+            r, slope, left = polish(f, f1, v, v1, enter, radius, radius1, far, speed)
+            ok = certain(r, slope, left, start, end)
             unsure = unsure | (want & ~ok)
-            found = want & ok & (wide(rounded(s, like)) > start)
-            todo = todo & ~(want & ~ok) & ~found
+            met = want & ok & (wide(rounded(r, like)) > start)
+            s, found = select(met, r, s), found | met
+            todo = todo & ~(want & ~ok) & ~met
     if side & FRONT == 0:
         leave = select(outer > 0, outer, inner)
+        if not where:
+            met = todo & (leave - slack > start) & (leave + slack < end)
+            s, found, todo = select(met, leave, s), found | met, todo & ~met
         want = todo & (leave + slack > start) & (leave - slack < end)
         if any_lane(want):
             r, slope, left = polish(f, f1, v, v1, leave, radius, radius1, far, speed)

@@ -153,10 +153,10 @@ def within(p, low, high, margin):
 
 
 @inline
-def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side, like):
+def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side, like, where):
     """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. part: which part of the
     form belongs to it, low and high being the box's corners, or low the slab's vector; none of it is further than `limit` from the origin.
-    No array may come in here, see `_ball.choose`."""
+    where: see `_ball.choose`."""
     w = -(near.b + with_sign(root(near.off), near.b))
     s0, s1 = w / near.a, near.c / w
     lead = size(near.a) + near.blur
@@ -174,6 +174,13 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end,
     for k in range(2):
         guess = select(swap, t1, t0) if k == 0 else select(swap, t0, t1)
         want = todo & (guess + slack > start) & (guess - slack < end) & (guess < np.inf)
+        if not where and side & (FRONT | BACK) == 0:
+            hit = want & (guess - slack > start) & (guess + slack < end)
+            if part != EVERYWHERE:
+                p, margin = along(f, guess, v), near.speed * slack + 8 * U64 * (limit + near.reach)
+                inside, maybe = between(p, low, margin) if part == IN_SLAB else within(p, low, high, margin)
+                hit, want = hit & inside, want & maybe
+            t, found, todo, want = select(hit, guess, t), found | hit, todo & ~hit, want & ~hit
         if any_lane(want):
             r, slope, left, p = polish(m, near, f, f1, v, v1, far, guess)
             steep = size(slope)
@@ -199,12 +206,12 @@ def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end,
 
 
 @inline
-def meet(ray, i, exact, q, most, part, limit, todo, near, side):
+def meet(ray, i, exact, q, most, part, limit, todo, near, side, where):
     """`choose` for surface q; t in the rays' precision."""
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     end, far = load(ray, T, i), near.far + most * extent(splat3(exact, q, PLACE))
     t, found, unsure = choose(todo, near, form_of(exact, q, 0 * f.x), f, f1, v, v1, far, splat3(exact, q, BOX), splat3(exact, q, BOX + 3),
-                              part, limit, wide(load(ray, START, i)), until(ray, i), side, end)
+                              part, limit, wide(load(ray, START, i)), until(ray, i), side, end, where)
     return rounded(t, end), found, unsure
 
 

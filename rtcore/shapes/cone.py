@@ -232,7 +232,7 @@ def settle_cap(rays, i, p, table, q, end, opacity):
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
-    walk = new_walk(rays)
+    walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
@@ -246,7 +246,8 @@ def intersect(rays, n, tree, table, first, opacity):
                         todo = may_meet(near) & alive(rays.ray, i)
                         late = 0
                         if any_lane(todo):
-                            t, found, unsure = _second.meet(rays.ray, i, table.exact, q, most, IN_SLAB, limit, todo, near, table.side[q])
+                            t, found, unsure = _second.meet(rays.ray, i, table.exact, q, most, IN_SLAB, limit, todo, near, table.side[q],
+                                                   where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                         while late:

@@ -79,7 +79,7 @@ def moved_form(coefficients, middle, half) -> list[Fraction]:
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
-    walk = new_walk(rays)
+    walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
@@ -92,7 +92,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         near = approach(rays.ray, i, table.exact, q, most, curved)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
-                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, IN_BOX, 2.0, todo, near, table.side[q])
+                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, IN_BOX, 2.0, todo, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
@@ -104,13 +104,14 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def intersect_open(rays, n, tree, table, first, opacity):
+    where = opacity.shape[0] == 0
     for q in range(table.data.shape[0]):
         most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
         for i in range(0, n, 8):
             near = approach(rays.ray, i, table.exact, q, most, curved)
             todo = may_meet(near) & alive(rays.ray, i)
             if any_lane(todo):
-                t, found, unsure = meet(rays.ray, i, table.exact, q, most, EVERYWHERE, 2.0, todo, near, table.side[q])
+                t, found, unsure = meet(rays.ray, i, table.exact, q, most, EVERYWHERE, 2.0, todo, near, table.side[q], where)
                 record(rays, i, first + q, t, found, opacity)
                 late = bits(unsure)
                 while late:

@@ -96,7 +96,7 @@ def apart(o, c, c1):
 
 
 @inline
-def meet(ray, i, data, exact, q, todo, far, near, side):
+def meet(ray, i, data, exact, q, todo, far, near, side, where):
     """Where the lanes `todo` first meet sphere q: as `choose`, t in the rays' precision."""
     o, d, c, unpower = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, 0), np.float64(data[q, 5])
     c1 = splat3(exact, q, 3)
@@ -106,7 +106,8 @@ def meet(ray, i, data, exact, q, todo, far, near, side):
     f, f1 = vec3(x, y, z) * unpower, vec3(x1, y1, z1) * unpower
     end, zero = load(ray, T, i), 0 * x
     s, found, unsure = choose(todo, near, f, f1, d, vec3(zero, zero, zero), exact[q, 6] + zero, exact[q, 7] + zero,
-                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, until(ray, i) * unpower, side, end)
+                              far + extent(c) * unpower, extent(d), wide(load(ray, START, i)) * unpower, until(ray, i) * unpower, side, end,
+                              where)
     return rounded(s * np.float64(data[q, 4]), end), found, unsure
 
 
@@ -127,7 +128,7 @@ def settle_sphere(rays, i, p, table, q, opacity):
 
 @kernel
 def intersect(rays, n, tree, table, first, opacity):
-    walk = new_walk(rays)
+    walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
@@ -139,7 +140,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         far, near = approach(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
-                            t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
+                            t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
@@ -190,12 +191,12 @@ def approach_ellipsoid(ray, i, data, exact, q):
 
 
 @inline
-def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side):
+def meet_ellipsoid(ray, i, data, exact, q, todo, far, near, side, where):
     """As `meet`."""
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     most, end, zero = np.float64(data[q, MOST]), load(ray, T, i), 0 * f.x
     s, found, unsure = choose(todo, near, f, f1, v, v1, 1 + zero, zero, far + most * extent(splat3(exact, q, PLACE)),
-                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), until(ray, i), side, end)
+                              most * extent(wide(load3(ray, DX, i))), wide(load(ray, START, i)), until(ray, i), side, end, where)
     return rounded(s, end), found, unsure
 
 
@@ -218,7 +219,7 @@ def settle_ellipsoid(rays, i, p, table, q, opacity):
 
 @kernel
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
-    walk = new_walk(rays)
+    walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
         begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
@@ -230,7 +231,8 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                         far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
-                            t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q])
+                            side = table.side[q]
+                            t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, side, where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:

@@ -8,9 +8,10 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
+from rtcore.across import lowest_bit
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, fma, load, load3, lowest_bit, select, size, store
+from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, hit_from, normalized, put_surface
@@ -198,7 +199,7 @@ def intersect(rays, n, tree, table, first, opacity):
     slant, axes = np.empty((4, PACKET), rays.ray.dtype), np.empty(PACKET // 8, np.int64)
     tiny = TINY32 if rays.ray.itemsize == 4 else TINY64
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 64)
+        begin(walk, rays, start, n, tree, 2048)
         if walk.state[TOP] == 0:
             continue
         shear(rays, start, n, slant, axes)
