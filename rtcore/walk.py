@@ -250,16 +250,13 @@ def _next_of_ray(walk, tree, table):
         slot = (slot + 1) & (SLOTS - 1)
         ray, top = slots[slot, 0], slots[slot, 1]
         if top == 0:
-            if ray < 0:
-                continue
             if waiting == 0:
+                running -= ray >= 0
                 slots[slot, 0] = -1
-                running -= 1
                 continue
-            slots[slot, 0], slots[slot, 1] = lowest_bit(waiting), 1
-            keys[slot, 0] = 0       # the root, entered at 0
+            ray, top = lowest_bit(waiting), 1
+            slots[slot, 0], keys[slot, 0] = ray, 0       # the root, entered at 0
             waiting &= waiting - 1
-            continue
         top -= 1
         reach, key = limit[REACH, ray], keys[slot, top]
         while top > 0 and key >> 32 > reach:

@@ -208,7 +208,7 @@ def intersect(rays, n, tree, table, first, opacity):
             ray = only_ray(walk)
             wanted = 7 if ray < 0 else 1 << int(slant[3, ray])
             for q in range(leaf_first(leaf), leaf_end(leaf)):
-                side, active = table.side[q], walk.state[ACTIVE]
+                active = walk.state[ACTIVE]
                 while active:
                     g = lowest_bit(active)
                     active &= active - 1
@@ -222,7 +222,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         if axes[g] != 1 << axis:
                             ok = ok & (load(slant, 3, g * 8) == axis)
                         if any_lane(ok):
-                            det, inverse = u + v + w, load(slant, 2, g * 8)
+                            det, inverse, side = u + v + w, load(slant, 2, g * 8), table.side[q]
                             late = bits(ok & (size(det) < tiny))
                             if side & (FRONT | BACK):
                                 # a ray along -axis, inverse < 0, sees the front where det < 0
@@ -272,10 +272,14 @@ def surface(rays, n, out, table, first):
 
 
 def _bounds(data, extra):
-    corners = data.reshape(-1, 3, 3)
-    low, high = corners.min(1), corners.max(1)
-    pad = 1e-14 * np.maximum(np.abs(low), np.abs(high)).max(1, keepdims=True)
-    return low - pad, high + pad
+    # corner by corner and column by column: numpy is four times slower along an axis of three
+    a, b, c = data[:, 0:3], data[:, 3:6], data[:, 6:9]
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    most = np.maximum(-low, high)
+    pad = 1e-14 * np.maximum(np.maximum(most[:, 0], most[:, 1]), most[:, 2])[:, None]
+    low -= pad
+    high += pad
+    return low, high
 
 
 TRIANGLE = Kind("triangle", intersect, surface, _bounds, (Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), ()))
