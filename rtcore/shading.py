@@ -132,12 +132,6 @@ def gather(wave, beam, n):
     return blocked
 
 
-@kernel
-def close(rays, n):
-    """Let nothing but the first n rays be traced."""
-    finish(rays, n)
-
-
 @inline
 def fresnel(cosine, eta):
     """Share of unpolarised light that a dielectric reflects (Fresnel). cosine: of the angle of incidence, 0 .. 1; eta: index of

@@ -194,7 +194,6 @@ class Tracer:
             if m == 0:
                 continue
             if self.plan.shadows:
-                shading.close(beam.rays, m)
                 for group in self.geometry.groups:
                     group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
                     clock.lap("shadow rays", group.kind.name)

@@ -84,9 +84,7 @@ def _rows(dtype):
 
 def _lit(dtype):
     wave, _, n = _wave(dtype)
-    beam = new_beam(n, 1, dtype)
-    shading.close(beam.rays, 0)
-    shading.gather(wave, beam, 0)
+    shading.gather(wave, new_beam(n, 1, dtype), 0)
 
 
 def _fog(dtype):

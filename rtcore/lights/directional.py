@@ -8,6 +8,7 @@ from rtcore.jit import kernel
 from rtcore.lanes import LANES, vec3, zero
 from rtcore.lights._shine import hit_points, shine_on
 from rtcore.scene import Light
+from rtcore.wave import finish
 
 
 class Directional(Light, frozen=True, kw_only=True):
@@ -27,4 +28,5 @@ def shine(wave, n, light, color, beam, first):
     for i in range(0, n, LANES):
         none = zero(hit_points(wave, i).x)
         first += shine_on(wave, i, beam, first, color, vec3(none + light[0], none + light[1], none + light[2]), none + np.inf, none + 1)
+    finish(beam.rays, first)
     return first

@@ -8,6 +8,7 @@ from rtcore.jit import kernel
 from rtcore.lanes import LANES, select, vec3, zero
 from rtcore.lights._shine import hit_points, shine_on
 from rtcore.scene import Light
+from rtcore.wave import finish
 
 
 class Point(Light, frozen=True, kw_only=True):
@@ -33,4 +34,5 @@ def shine(wave, n, light, color, beam, first):
         # a surface that contains the light is not lit by it
         strength = select(square > 0, 1 / square if light[3] != 0 else 1 + zero(square), 0)
         first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 + zero(square), strength)
+    finish(beam.rays, first)
     return first
