@@ -31,7 +31,7 @@ class Engine:
         from rtcore import film, progressive, warm
         self._film, self._progressive, self._warm = film, progressive, warm
         self._renderer = progressive.Renderer()
-        self._warmed: tuple[Scene, Options] | None = None
+        self._warmed: tuple[Scene, Options, bool] | None = None
 
     def request(self, job: Job) -> "RenderRequest":
         """The renderer's own form of a job."""
@@ -41,10 +41,11 @@ class Engine:
     def missing(self, job: Job) -> list[str]:
         """Names of the kernels that this job needs and the cache does not have yet. A scene of thousands of shapes is looked
         through once, not at every step of a drag."""
-        if self._warmed is not None and self._warmed[0] is job.scene and self._warmed[1] == job.options:
+        lens = job.camera.aperture > 0
+        if self._warmed is not None and self._warmed[0] is job.scene and self._warmed[1:] == (job.options, lens):
             return []
-        names = self._warm.missing(job.scene, self.request(job).settings, screen=True)
-        self._warmed = None if names else (job.scene, job.options)
+        names = self._warm.missing(job.scene, self.request(job).settings, screen=True, camera=job.camera)
+        self._warmed = None if names else (job.scene, job.options, lens)
         return names
 
     def frames(self, request: "RenderRequest", cancelled: Callable[[], bool]) -> "Iterator[Frame]":

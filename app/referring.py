@@ -24,7 +24,7 @@ def render(job: Job, samples: int, cancelled: Callable[[], bool], progress: Call
     from rtcore.settings import Settings
     from rtcore.warm import missing
     settings = Settings(size=job.size, **{**job.options.settings(), "view": "beauty", "precision": "f64", "samples": samples})
-    if names := missing(job.scene, settings):
+    if names := missing(job.scene, settings, camera=job.camera):
         compiler.compile(names, lambda state: None)
     renderer, found = Renderer(), None
     try:

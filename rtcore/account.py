@@ -16,7 +16,7 @@ from rtcore.shapes import KINDS
 PLURALS = {"box": "boxes", "cone": "cones and cylinders", "torus": "tori", "polyhedron": "polyhedra", "open-polyhedron": "open polyhedra",
            "open-quadric": "open quadrics", "implicit": "formulas"}
 #: Stages as the end of "it spends a tenth of its time on ...".
-WORDS = {"primary rays": "casting the eye's rays", "surface at the hits": "points and normals where they hit",
+WORDS = {"primary rays": "casting the eye's rays", "depth of field": "the lens", "surface at the hits": "points and normals where they hit",
          "reflected and refracted rays": "sending reflected and refracted rays on",
          "film": "adding up the samples"}
 TOLD = 3        # stages that a sentence names

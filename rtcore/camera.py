@@ -34,14 +34,17 @@ class Chain(NamedTuple):
 
 
 class Camera(Record, frozen=True, kw_only=True):
-    """A pinhole camera. `fov` is vertical, in degrees, and spans the picture from edge to edge (or, as NFF has it, from
-    the first row's centre to the last row's, with ``span="centers"``). Pixels are square."""
+    """A pinhole camera, or with an `aperture` a thin lens, behind which a plane across the view is sharp and all else is not. `fov` is
+    vertical, in degrees, and spans the picture from edge to edge (or, as NFF has it, from the first row's centre to the last row's, with
+    ``span="centers"``). Pixels are square."""
 
     lookfrom: Annotated[Vec, Vector(help="where the eye is", unit="scene units")] = (0.0, 0.0, -5.0)
     lookat: Annotated[Vec, Vector(help="the point in the middle of the picture", unit="scene units")] = (0.0, 0.0, 0.0)
     up: Annotated[Vec, Vector(nonzero=True, help="which way is up; need not be at right angles to the view")] = (0.0, 1.0, 0.0)
     fov: Annotated[float, Number(above=0, below=180, help="vertical field of view", unit="degrees")] = 40.0
     span: Annotated[str, Choice(words=("edges", "centers"), help="fov from edge to edge, or between the outer rows' centres")] = "edges"
+    aperture: Annotated[float, Number(least=0, help="diameter of the lens; 0: a pinhole, and all is sharp", unit="scene units")] = 0.0
+    focus: Annotated[float, Number(least=0, help="distance, along the view, of what is sharp; 0: that of lookat", unit="scene units")] = 0.0
 
     def check(self):
         with np.errstate(over="ignore"):
@@ -83,6 +86,12 @@ class Camera(Record, frozen=True, kw_only=True):
         u, v, w = self.basis()
         pitch = self.pitch(ny)
         return np.stack([np.array(self.lookfrom), w + (nx / 2 * u + ny / 2 * v) * pitch, -u * pitch, -v * pitch])
+
+    def lens(self) -> np.ndarray:
+        """(3, 3): half the lens' width to the left, half its height upward, and w over the distance of the plane that is sharp: a point p
+        from the eye lies in that plane if row 2 · p = 1."""
+        u, v, w = self.basis()
+        return np.stack([u * (self.aperture / 2), v * (self.aperture / 2), w / (self.focus or self.distance())])
 
     def project(self, point, nx: int, ny: int) -> tuple[float, float] | None:
         """Pixel coordinates (from the top left) of a world point, or None if it is not in front of the eye."""

@@ -3,6 +3,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtcore.camera import Camera
 from rtcore.lights import SHINE, STUDIO, Ambient
 from rtcore.scene import Leaf, Light, Scene
 from rtcore.settings import Settings
@@ -12,6 +13,7 @@ from rtcore.views import VIEWS
 
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
+FIRST_SAMPLE = "a pixel's first sample goes through the middle of the lens"
 GLOW = "background and ambient light"
 
 
@@ -27,18 +29,22 @@ class Plan(NamedTuple):
     shadows: bool
     bounces: bool
     fog: bool
+    lens: bool
     samples: int                    # per pixel
 
 
-def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = None) -> Plan:
-    """The plan for a scene; `leaves` saves a second walk over it."""
+def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = None, camera: Camera | None = None) -> Plan:
+    """The plan for a scene, from its own camera if none is given; `leaves` saves a second walk over it."""
     visible = [leaf for leaf in (scene.leaves() if leaves is None else leaves) if leaf.visible]
     counts: dict[Kind, int] = {}
     for leaf in visible:
         kind = leaf.shape.kind(leaf.matrix)
         counts[kind] = counts.get(kind, 0) + leaf.shape.count()
     materials = {id(leaf.material): leaf.material for leaf in visible}.values()
+    lit, camera = VIEW[settings.view].needs_light, camera or scene.camera or Camera()
     stages, out = ["primary rays"], []
+    lens = _keep(stages, out, "depth of field", [
+        (lit, NO_LIGHT), (camera.aperture > 0, "the camera is a pinhole"), (settings.samples > 1, FIRST_SAMPLE)])
     for kind in sorted(KINDS, key=lambda k: k.name):
         if kind not in counts:
             out.append((f"hits: {kind.name}", f"no visible {kind.name} in the scene"))
@@ -59,7 +65,6 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     ambient = np.sum(everywhere or [np.zeros(3)], axis=0)
     answers = any(m.diffuse > 0 or m.specular > 0 for m in materials)
     lights = tuple(light for light in shining if not isinstance(light, Ambient)) if answers else ()
-    lit = VIEW[settings.view].needs_light
     lights = lights if lit else ()
     _keep(stages, out, GLOW, [(lit, NO_LIGHT)])
     if lights:
@@ -81,7 +86,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     stages.append("film")
     kinds = tuple(sorted(counts, key=lambda k: k.name))
     casting = sorted({type(light).__name__.lower() for light in lights})
-    wanted = {"core": True, "glow": lit, "samples": "further samples" in stages, "doubt": any(kind in DOUBTFUL for kind in kinds),
+    wanted = {"core": True, "glow": lit, "lens": lens, "samples": "further samples" in stages,
+              "doubt": any(kind in DOUBTFUL for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds},
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
@@ -89,7 +95,7 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, settings.samples if lit else 1)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, settings.samples if lit else 1)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

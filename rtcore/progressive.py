@@ -75,7 +75,8 @@ class Render:
         self.dropped = geometry.dropped
         width, height = self.settings.size
         view = camera.rays(width, height)
-        self.tracer = Tracer(geometry, self.plan, self.settings, view, camera.up, scene.background, scene.fog)
+        lens = camera.lens() if self.plan.lens else None
+        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
         self.film = films.new_film(width, height, self.plan.samples)
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
         self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
@@ -222,7 +223,7 @@ class Renderer:
         self._pool: ThreadPoolExecutor | None = None
         self._threads = 0
         self._render: Render | None = None
-        self._planned: tuple[Scene, Settings, Plan] | None = None
+        self._planned: tuple[Scene, Settings, bool, Plan] | None = None
         self._kernels: set[str] = set()
         self._compile = self._prepare = 0.0
 
@@ -249,7 +250,7 @@ class Renderer:
         ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far. The same
         request again goes on from there, with another view too: then the first picture comes at once and nothing is traced twice."""
         start = time.perf_counter()
-        composed = self._composed(request.scene, request.settings)
+        composed = self._composed(request)
         loaded = time.perf_counter()
         threads = request.settings.threads or cores()
         render = self._render
@@ -276,11 +277,14 @@ class Renderer:
             yield render.frame(render.done)
             render.number += not render.done
 
-    def _composed(self, scene: Scene, settings: Settings) -> Plan:
-        """The plan, made anew only for another scene or other settings, with all its kernels at hand: from the cache, or compiled."""
-        if self._planned is None or self._planned[0] is not scene or self._planned[1] != settings:
-            self._planned = scene, settings, plan(scene, settings)
-        composed = self._planned[2]
+    def _composed(self, request: RenderRequest) -> Plan:
+        """The plan, made anew only for another scene, other settings or a lens put on or off, with all its kernels at hand: from the cache,
+        or compiled."""
+        scene, camera, settings = request
+        lens = camera.aperture > 0
+        if self._planned is None or self._planned[0] is not scene or self._planned[1:3] != (settings, lens):
+            self._planned = scene, settings, lens, plan(scene, settings, camera=camera)
+        composed = self._planned[3]
         needed = [name for name in composed.kernels if name not in self._kernels]
         if needed:
             from rtcore.warm import compile_kernels     # not at the top: `python -m rtcore.warm` must not find itself imported already

@@ -6,12 +6,14 @@ the Sobol (0, 2)-sequence under nested uniform (Owen) scrambling, done by a hash
 of one sequence differs from that of another by tells the error of their mean; how the samples of one sequence scatter would tell too much.
 
 Dimensions come in pairs. Pair 0 is where in the pixel the sample lies; its sample 0 is the pixel's centre: of all scramblings of the first
-sequence those are taken that bring its first point there, so it is one of the stratified points and counts as any other.
+sequence those are taken that bring its first point there, so it is one of the stratified points and counts as any other. `centered` does
+the same for other pairs: so a picture of one sample is free of noise.
 """
 import numpy as np
 
 from rtcore.jit import inline
 
+LENS = 1            # the pair of dimensions for a place on the lens
 REPLICATES = 2      # more would tell the error better and make it larger: edges converge as R^(1/4) N^(-3/4)
 
 
@@ -71,6 +73,29 @@ def square(pixel, sample, dimension, seed):
     index = mirrored(scrambled(mirrored(np.uint32(sample // REPLICATES)), hash32(across ^ np.uint32(0x2545F491))))
     x, y = mirrored(scrambled(index, across)), mirrored(scrambled(pascal(index), down))
     return x * 2.0 ** -32, y * 2.0 ** -32
+
+
+@inline
+def centered(pixel, sample, dimension, seed):
+    """`square`, scrambled so that sample 0 lies in the middle."""
+    x, y = square(pixel, sample, dimension, seed)
+    if sample % REPLICATES == 0:    # flip the digits by those of sample 0 and of 0.1000...: this is a nested scrambling too
+        a, b = square(pixel, 0, dimension, seed)
+        x = (np.uint32(x * 2.0 ** 32) ^ np.uint32(a * 2.0 ** 32) ^ np.uint32(0x80000000)) * 2.0 ** -32
+        y = (np.uint32(y * 2.0 ** 32) ^ np.uint32(b * 2.0 ** 32) ^ np.uint32(0x80000000)) * 2.0 ** -32
+    return x, y
+
+
+@inline
+def disk(u, v):
+    """A point of the unit disk for one of the unit square, areas and neighbourhoods kept, the middle for the middle (Shirley and Chiu, "A
+    Low Distortion Map Between Disk and Square", Journal of Graphics Tools 2(3), 1997)."""
+    a, b = 2 * u - 1, 2 * v - 1
+    if a == 0 and b == 0:
+        return 0.0, 0.0
+    if abs(a) > abs(b):
+        return a * np.cos(np.pi / 4 * (b / a)), a * np.sin(np.pi / 4 * (b / a))
+    return b * np.sin(np.pi / 4 * (a / b)), b * np.cos(np.pi / 4 * (a / b))
 
 
 @inline

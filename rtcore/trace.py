@@ -10,6 +10,7 @@ from rtcore import film as films, fog as fogs, shading
 from rtcore.eye import cast, cast_list
 from rtcore.flatten import Geometry, nbytes
 from rtcore.lanes import LANES
+from rtcore.lens import bend
 from rtcore.lights import SHINE
 from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
@@ -62,7 +63,7 @@ class Scratch:
         self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
         self.waves: list[Wave] = []
         self.beam = new_beam(0, 0, dtype)
-        self.target = np.zeros(0, np.int32)
+        self.target = self.number = np.zeros(0, np.int32)
         self.sample = np.zeros((3, 0), np.float32)
 
     def wave(self, level: int, n: int) -> Wave:
@@ -75,15 +76,15 @@ class Scratch:
         return self.waves[level]
 
     def primary(self, n: int) -> Wave:
-        """The first wave, its pixels and its sample, with room for n rays."""
+        """The first wave, its pixels, the numbers of its samples and what they bring, with room for n rays."""
         if len(self.target) < n:
-            self.target, self.sample = np.empty(n, np.int32), np.empty((3, n), np.float32)
+            self.target, self.number, self.sample = np.empty(n, np.int32), np.empty(n, np.int32), np.empty((3, n), np.float32)
         return self.wave(0, n)
 
     @property
     def nbytes(self) -> int:
         """Bytes of all waves and of what belongs to them."""
-        return nbytes((self.waves, self.beam, self.target, self.sample))
+        return nbytes((self.waves, self.beam, self.target, self.number, self.sample))
 
     def tally(self) -> np.ndarray:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
@@ -100,8 +101,9 @@ class Scratch:
 class Tracer:
     """Traces tiles of one scene from one camera. Holds nothing that changes, so threads may share it."""
 
-    def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, up, background: Background, fog: Fog | None):
-        self.geometry, self.plan, self.settings, self.view = geometry, plan, settings, view
+    def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, lens: np.ndarray | None, up,
+                 background: Background, fog: Fog | None):
+        self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
         self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity))
                       for light in plan.lights]
@@ -113,15 +115,18 @@ class Tracer:
         wave = scratch.primary(int(tile[2] * tile[3]))
         scratch.clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
+        scratch.number[:n] = sample
         return n == 0 or film.count[scratch.target[0]] > sample or self._trace(scratch, film, wave, n, sample == 0, stale)
 
     def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
         """The same for further samples of a list of pixels (see `eye.cast_list`)."""
         if film.count[pixels[0, 0]] > pixels[0, 1]:
             return True
-        wave = scratch.primary(int((pixels[:, 2] - pixels[:, 1]).sum()))
+        each = pixels[:, 2] - pixels[:, 1]
+        wave = scratch.primary(int(each.sum()))
         scratch.clock.start()
         n = cast_list(wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)
+        scratch.number[:n] = np.arange(n) - np.repeat(np.cumsum(each) - pixels[:, 2], each)
         return self._trace(scratch, film, wave, n, False, stale)
 
     def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, first: bool, stale: Callable[[], bool]) -> bool:
@@ -129,6 +134,9 @@ class Tracer:
         counts, clock = np.zeros_like(scratch.counts), scratch.clock
         scratch.sample[:, :n] = 0
         clock.lap("primary rays", "core")
+        if self.lens is not None and not first:     # a first sample goes through the middle
+            bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
+            clock.lap("depth of field", "lens")
         self.hit(clock, wave, n)
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
         if first:

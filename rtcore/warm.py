@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, rows, shading
+from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.lights import SHINE
@@ -40,6 +40,11 @@ def _core(dtype):
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, 8, 8, 1, pixels)
     films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
+
+
+def _lens(dtype):
+    wave, target, n = _wave(dtype)
+    lens.bend(wave, n, target, np.ones(n, np.int32), Camera(aperture=1).lens(), 0)
 
 
 def _glow(dtype):
@@ -119,7 +124,7 @@ def _kind(kind):
 GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
-    "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
+    "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
     "adaptive": ("rtcore.adaptive", _adaptive),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
@@ -131,9 +136,10 @@ def _marker(name: str):
     return jit.cache_folder(GROUPS[name.split(".")[0]][0]) / f"{name}.warm"
 
 
-def missing(scene: Scene, settings: Settings, screen: bool = False) -> list[str]:
-    """Names of the kernel groups that this render needs and the cache lacks, and its way to the screen if wanted. Compiles nothing."""
-    names = (*plan(scene, settings).kernels, *([f"screen.{settings.precision}"] if screen else []))
+def missing(scene: Scene, settings: Settings, screen: bool = False, camera: Camera | None = None) -> list[str]:
+    """Names of the kernel groups that this render needs and the cache lacks, and its way to the screen if wanted; from the scene's camera
+    if none is given. Compiles nothing."""
+    names = (*plan(scene, settings, camera=camera).kernels, *([f"screen.{settings.precision}"] if screen else []))
     return [name for name in names if not _marker(name).exists()]
 
 

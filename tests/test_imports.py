@@ -22,7 +22,7 @@ LAYERS = (
     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.bvh", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
-    {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.shading", "rtcore.fog", "rtcore.film",
+    {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.lens", "rtcore.shading", "rtcore.fog", "rtcore.film",
      "rtcore.schedule", "rtcore.adaptive"},
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
     {"rtcore.algebra", "rtcore.trace"},

@@ -26,7 +26,7 @@ class CameraPanel(Panel):
     def __init__(self, session: Session, parent: QWidget | None = None):
         super().__init__(session, parent)
         self.form = RecordForm(lambda: session.camera or Camera(), lambda camera, label, merge: session.move(camera, merge), session.seal,
-                               only=("lookfrom", "lookat", "up", "fov"), editors={"fov": SliderEdit(5, 120)})
+                               only=("lookfrom", "lookat", "up", "fov", "aperture", "focus"), editors={"fov": SliderEdit(5, 120)})
         self.column.addWidget(self.form)
         self.back = small_button(icon("back", DARK), "View back", "The view before this one (Alt+Left)", session.back)
         self.forward = small_button(icon("forward", DARK), "View forward", "The view that Back left (Alt+Right)", session.forward)
