@@ -53,6 +53,7 @@ def test_sentences():
         f"It shows cones and cylinders, planes and spheres and needs no kernel of the {len(KINDS) - 3} other kinds of shapes.",
         "No tree is built for cones and cylinders (only 1: each is tested), planes (they are unbounded) and spheres (only 1: each is "
         "tested).",
+        "Depth of field is left out: the camera is a pinhole.",
         "Smooth normals are left out: no mesh brings normals.",
         "Patterns are left out: no visible material has one.",
         "Fog is left out: the scene has none.",

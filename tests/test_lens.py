@@ -53,12 +53,13 @@ def test_places_on_the_lens_are_stratified_and_begin_in_the_middle():
 @pytest.mark.parametrize("depth", [-2.0, 6.0])
 def test_a_far_point_becomes_the_disk_of_a_thin_lens(depth, precision):
     """A small ball at distance z spreads over aperture·|1/z - 1/focus| of the picture plane at distance 1, its light shared out evenly."""
+    camera = msgspec.structs.replace(PINHOLE, aperture=1.0)
     z, ball = 4 + depth, Sphere((0, 0, depth), 0.04 * (4 + depth) / 4)
-    blurred = rendered(LENS_CAMERA, ball, precision=precision, threads=2).pixels[..., 0].astype(float)
+    blurred = rendered(camera, ball, precision=precision, threads=2).pixels[..., 0].astype(float)
     sharp = rendered(PINHOLE, ball, precision=precision).pixels[..., 0].astype(float)
     assert blurred.sum() == pytest.approx(sharp.sum(), rel=0.06)
-    pitch = LENS_CAMERA.pitch(65)
-    radius = LENS_CAMERA.aperture / 2 * abs(1 / z - 1 / 4) / pitch
+    pitch = camera.pitch(65)
+    radius = camera.aperture / 2 * abs(1 / z - 1 / 4) / pitch
     y, x = np.mgrid[-32:33, -32:33]
     away = np.hypot(x, y)
     small = 0.04 / 4 / pitch + 1        # the ball itself, and a pixel
