@@ -27,12 +27,15 @@ def exact_plane(matrix: np.ndarray, point, normal) -> list[float]:
 @inline
 def approach(ray, i, exact, q):
     """Where eight rays reach plane q, plainly, what that may be off, and those that may do so within their interval."""
-    down, d, normal = splat3(exact, q, POINT) - wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, NORMAL)
+    p, d, normal = splat3(exact, q, POINT), wide(load3(ray, DX, i)), splat3(exact, q, NORMAL)
+    down = p - wide(load3(ray, OX, i))
     height, speed = dot(normal, down), dot(normal, d)
     t = height / speed
-    # no number of the normal is above 1; the point is known to a rounding, also where it is far away
-    slack = 2.0 ** -20 * size(t) + 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT))) / size(speed)
-    off = 16 * U64 * (extent(down) + extent(splat3(exact, q, POINT)) + extent(d) * size(t)) / size(speed)
+    # the point and the normal are known to a rounding each; part by part, or every ray that leaves a level floor would be in doubt
+    heft = (size(normal.x) * (size(down.x) + size(p.x)) + size(normal.y) * (size(down.y) + size(p.y))
+            + size(normal.z) * (size(down.z) + size(p.z)))
+    slack = 2.0 ** -20 * size(t) + 7 * U64 * heft / size(speed)
+    off = 16 * U64 * (extent(down) + extent(p) + extent(d) * size(t)) / size(speed)     # no number of the normal is above 1
     start, end = wide(load(ray, START, i)), until(ray, i)
     return t, off, (end > start) & ((size(speed) <= 2.0 ** -24 * extent(d)) | ~((t + slack < start) | (t - slack > end)))
 
