@@ -12,7 +12,7 @@ from test_shapes import EXAMPLES, rays_at, transform
 DTYPE = {"f64": np.float64, "f32": np.float32}
 #: Where t is the true one to half an ulp, so that it can't depend on the axes' order by more than one.
 CERTAIN = {"sphere", "plane", "polygon", "box", "cylinder", "tube", "cone", "frustum", "funnel", "saddle", "hyperboloid", "torus",
-           "spindle", "gem", "wedge"}
+           "spindle", "gem", "wedge", "blob", "bitten blob", "blob of eight"}
 
 number = st.floats(-3, 3, width=32)
 ray = st.tuples(number, number, number, number, number, number).filter(lambda r: max(map(abs, r[3:])) > 1e-3)

@@ -23,7 +23,7 @@ NOISE = 2.0 ** -51              # rounding of the summed field, as a share of th
 TINY = 2.0 ** -45               # pieces are not cut to less, in lengths of the blob
 X, Y, Z, RADIUS, STRENGTH, PARTS = 0, 1, 2, 3, 4, 5     # of an element; in a table, what float32 leaves of each part follows
 ROUGH = 5                       # of an element in Scratch: |strength| (1 + 4 / radius), which makes w's rounding the field's
-MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ = 0, 1, 2, 3, 4       # of a span; FUZZ is its element's ROUGH
+MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ, ELEMENT = 0, 1, 2, 3, 4, 5       # of a span; FUZZ is its element's ROUGH, ELEMENT which one that is
 #: Of a ray: closest approach to the middle, unit direction, speed, t of the closest approach and what that lacks; origin and direction
 #: as pairs, high parts first.
 POINT, ALONG, SPEED, SHIFT, MORE, FROM, WAY, LINE_ROWS = 0, 3, 6, 7, 8, 9, 15, 21
@@ -35,7 +35,7 @@ class Scratch(NamedTuple):
     """What the search along one ray works on; made once per kernel call."""
 
     element: np.ndarray     # float64 (n, 6): the blob at hand
-    span: np.ndarray        # float64 (n, 5): of the elements that the ray meets, see MIDDLE ..
+    span: np.ndarray        # float64 (n, 6): of the elements that the ray meets, see MIDDLE ..
     end: np.ndarray         # float64 (2 n): where spans begin and end, ascending
     whose: np.ndarray       # int64 (2 n): number k of the span that begins there, ~k of the one that ends
     active: np.ndarray      # int64 (n): spans that cover the stretch at hand
@@ -46,7 +46,7 @@ class Scratch(NamedTuple):
 
 @inline_new
 def new_scratch(rays):
-    return Scratch(np.empty((MOST_ELEMENTS, 6)), np.empty((MOST_ELEMENTS, 5)), np.empty(2 * MOST_ELEMENTS + 1),
+    return Scratch(np.empty((MOST_ELEMENTS, 6)), np.empty((MOST_ELEMENTS, 6)), np.empty(2 * MOST_ELEMENTS + 1),
                    np.empty(2 * MOST_ELEMENTS, np.int64), np.empty(MOST_ELEMENTS, np.int64), np.empty((DEEPEST + 4, 8)),
                    np.empty((1, 8), rays.ray.dtype), np.empty((LINE_ROWS, 8)))
 
@@ -65,7 +65,7 @@ def meet(scratch, count, nx, ny, nz, ex, ey, ez, low):
             h = np.sqrt(square)
             if h - b > low:
                 span[m, MIDDLE], span[m, HALF2], span[m, RADIUS2], span[m, WEIGHT] = -b, square, r * r, element[k, STRENGTH]
-                span[m, FUZZ] = element[k, ROUGH]
+                span[m, FUZZ], span[m, ELEMENT] = element[k, ROUGH], k
                 for side in range(2):
                     at = -b - h if side == 0 else -b + h
                     j = 2 * m + side
@@ -129,34 +129,84 @@ def count_turns(a, b, c, d):
 
 
 @inline
-def keep(found, lane, t, start):
-    """Keeps t, rounded to the ray's precision: HIT if it is past the ray's start, else UNSURE."""
-    found[0, lane] = t
-    return HIT if found[0, lane] > start else UNSURE
+def here(line, lane, t):
+    """The point of ray `lane` at t, as three pairs."""
+    x, x1 = advance(line[FROM, lane], line[FROM + 3, lane], t, line[WAY, lane], line[WAY + 3, lane])
+    y, y1 = advance(line[FROM + 1, lane], line[FROM + 4, lane], t, line[WAY + 1, lane], line[WAY + 4, lane])
+    z, z1 = advance(line[FROM + 2, lane], line[FROM + 5, lane], t, line[WAY + 2, lane], line[WAY + 5, lane])
+    return x, x1, y, y1, z, z1
+
+
+@inline
+def softness(element, k, x, x1, y, y1, z, z1):
+    """Element k's w at a point, as a pair, and the way there from its middle."""
+    x, x1 = add(x, x1, -element[k, X], 0.0)
+    y, y1 = add(y, y1, -element[k, Y], 0.0)
+    z, z1 = add(z, z1, -element[k, Z], 0.0)
+    a, a1 = square(x, x1)
+    b, b1 = square(y, y1)
+    a, a1 = add(a, a1, b, b1)
+    b, b1 = square(z, z1)
+    a, a1 = add(a, a1, b, b1)
+    b, b1 = two_product(element[k, RADIUS], element[k, RADIUS])
+    a, a1 = add(b, b1, -a, -a1)
+    a, a1 = divide(a, a1, b, b1)
+    return a, a1, x, y, z
 
 
 @inline
 def begins_inside(scratch, count, threshold, lane, start):
     """The sign of the field where ray `lane` starts, in double-double; 0 if even that can't tell."""
-    line, element = scratch.line, scratch.element
-    total, total1, size = -threshold, 0.0, threshold
-    x, x1 = advance(line[FROM, lane], line[FROM + 3, lane], start, line[WAY, lane], line[WAY + 3, lane])
-    y, y1 = advance(line[FROM + 1, lane], line[FROM + 4, lane], start, line[WAY + 1, lane], line[WAY + 4, lane])
-    z, z1 = advance(line[FROM + 2, lane], line[FROM + 5, lane], start, line[WAY + 2, lane], line[WAY + 5, lane])
+    element, total, total1, size = scratch.element, -threshold, 0.0, threshold
+    x, x1, y, y1, z, z1 = here(scratch.line, lane, start)
     for k in range(count):
-        a, a1 = square(*add(x, x1, -element[k, X], 0.0))
-        b, b1 = square(*add(y, y1, -element[k, Y], 0.0))
-        a, a1 = add(a, a1, b, b1)
-        b, b1 = square(*add(z, z1, -element[k, Z], 0.0))
-        a, a1 = add(a, a1, b, b1)
-        b, b1 = two_product(element[k, RADIUS], element[k, RADIUS])
-        a, a1 = add(b, b1, -a, -a1)
-        if a > 0:
-            a, a1 = divide(a, a1, b, b1)
-            size += element[k, ROUGH] * a
-            a, a1 = scale(*square(a, a1), element[k, STRENGTH])
-            total, total1 = add(total, total1, a, a1)
+        w, w1, _, _, _ = softness(element, k, x, x1, y, y1, z, z1)
+        if w > 0:
+            size += element[k, ROUGH] * w
+            w, w1 = scale(*square(w, w1), element[k, STRENGTH])
+            total, total1 = add(total, total1, w, w1)
     return np.sign(total) if abs(total) > 2.0 ** -96 * size else 0.0
+
+
+@inline
+def polish(scratch, n, threshold, lane, t):
+    """The root next to t, of the field of the n active spans, by Newton's method in double-double; NaN if it doesn't get there."""
+    line, element = scratch.line, scratch.element
+    vx, vy, vz, unit = line[WAY, lane], line[WAY + 1, lane], line[WAY + 2, lane], 1 / line[SPEED, lane]
+    for _ in range(3):
+        total, total1, f1, f2 = -threshold, 0.0, 0.0, 0.0
+        x, x1, y, y1, z, z1 = here(line, lane, t)
+        for i in range(n):
+            k = scratch.active[i]
+            weight, scaled = scratch.span[k, WEIGHT], -2 / scratch.span[k, RADIUS2]
+            w, w1, ux, uy, uz = softness(element, int(scratch.span[k, ELEMENT]), x, x1, y, y1, z, z1)
+            slope = (ux * vx + uy * vy + uz * vz) * scaled
+            f1 += 2 * weight * w * slope
+            f2 += 2 * weight * (slope * slope + w * (vx * vx + vy * vy + vz * vz) * scaled)
+            w, w1 = scale(*square(w, w1), weight)
+            total, total1 = add(total, total1, w, w1)
+        step = -total / f1
+        t += step
+        if abs(f2 * step) * abs(step) <= 2.0 ** -58 * abs(f1) * max(abs(t), 2.0 ** -40 * unit):      # the rest is less than a rounding
+            return t
+    return np.nan
+
+
+@inline
+def keep(scratch, n, threshold, lane, s, t, noise, start):
+    """Keeps the root near s and t, to the last digit of the ray's precision: HIT if it is past the ray's start, else UNSURE."""
+    found, unit = scratch.found, 1 / scratch.line[SPEED, lane]
+    f, f1, f2 = field(scratch, n, threshold, s)
+    blur = 2 * (abs(f) + noise) / abs(f1) * unit + 2.0 ** -50 * abs(t)
+    found[0, lane] = t - blur
+    least = found[0, lane]
+    found[0, lane] = t + blur
+    if found[0, lane] != least or not 16 * abs(f2) * noise <= f1 * f1:
+        t = polish(scratch, n, threshold, lane, t)
+        found[0, lane] = t - 2.0 ** -51 * abs(t) - 2.0 ** -90 * unit
+        least = found[0, lane]
+        found[0, lane] = t
+    return HIT if least > start else UNSURE
 
 
 @inline
@@ -222,7 +272,7 @@ def search(scratch, count, m, threshold, low, shift, more, speed, start, far, si
                             return UNSURE
                         inside = after
                         if rising if after else falling:
-                            return keep(found, lane, shift + (more + lo / speed), start)
+                            return keep(scratch, n, threshold, lane, lo, shift + (more + lo / speed), noise, start)
                     edge = 0.0
                     continue
                 d0, d1, d2, d3 = c1 - c0, c2 - c1, c3 - c2, c4 - c3
@@ -273,5 +323,5 @@ def search(scratch, count, m, threshold, low, shift, more, speed, start, far, si
             inside = rises > 0
             if rising if inside else falling:
                 s = solve(scratch, n, threshold, lo, hi, inside, 0)
-                return keep(found, lane, shift + (more + s / speed), start)
+                return keep(scratch, n, threshold, lane, s, shift + (more + s / speed), noise, start)
     return MISS
