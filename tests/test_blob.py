@@ -5,7 +5,6 @@ import pytest
 import rtcore
 from rtcore import Blob, FieldError, Matrix, Node, Scale, Scene, Shear
 from rtcore.flatten import flatten
-from rtcore.reports.condition import condition
 from rtcore.reports.oracle import TWINS, crossings, mp, nearest, vector
 from rtcore.trace import CLOSEST
 from rtcore.wave import DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
@@ -177,7 +176,6 @@ def test_first_crossing(precision, blob, place):
     rng, dtype = np.random.default_rng(4), {"f64": np.float64, "f32": np.float32}[precision]
     node = Node(shape=blob, transform=PLACES[place])
     matrix, = (leaf.matrix for leaf in Scene(objects=[node]).leaves())
-    shape = blob if precision == "f64" else blob.rounded(np.float32)
     for o, d in rays_at(rng, blob, 8):
         o, d = (o @ matrix[:3, :3].T + matrix[:3, 3]).astype(dtype), (d @ matrix[:3, :3].T).astype(dtype)
         hits = rtcore.intersect(Scene(objects=[node]), o, d, precision=precision)

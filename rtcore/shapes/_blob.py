@@ -21,8 +21,9 @@ DEEPEST = 48                    # pieces that wait; a stretch cut so often has n
 SPLIT = 0.46875                 # where a piece is cut: not in the middle, in which symmetric things have their double roots
 NOISE = 2.0 ** -51              # rounding of the summed field, as a share of threshold + sum of |strength| w (1 + 4 / radius)
 TINY = 2.0 ** -45               # pieces are not cut to less, in lengths of the blob
-X, Y, Z, RADIUS, STRENGTH, PARTS = 0, 1, 2, 3, 4, 5     # of an element; in a table, what float32 leaves of each part follows
+X, Y, Z, RADIUS, STRENGTH, PARTS = 0, 1, 2, 3, 4, 5     # of an element; in a table, what float32 leaves of each part follows, and REST
 ROUGH = 5                       # of an element in Scratch: |strength| (1 + 4 / radius), which makes w's rounding the field's
+REST, ELEMENT_COLUMNS = 6, 9    # of an element in Scratch: what float64 leaves of X, Y, Z
 MIDDLE, HALF2, RADIUS2, WEIGHT, FUZZ, ELEMENT = 0, 1, 2, 3, 4, 5       # of a span; FUZZ is its element's ROUGH, ELEMENT which one that is
 #: Of a ray: closest approach to the middle, unit direction, speed, t of the closest approach and what that lacks; origin and direction
 #: as pairs, high parts first.
@@ -34,7 +35,7 @@ LO, HI, RISES = 5, 6, 7         # of a piece, after its five coefficients; RISES
 class Scratch(NamedTuple):
     """What the search along one ray works on; made once per kernel call."""
 
-    element: np.ndarray     # float64 (n, 6): the blob at hand
+    element: np.ndarray     # float64 (n, 9): the blob at hand
     span: np.ndarray        # float64 (n, 6): of the elements that the ray meets, see MIDDLE ..
     end: np.ndarray         # float64 (2 n): where spans begin and end, ascending
     whose: np.ndarray       # int64 (2 n): number k of the span that begins there, ~k of the one that ends
@@ -46,7 +47,7 @@ class Scratch(NamedTuple):
 
 @inline_new
 def new_scratch(rays):
-    return Scratch(np.empty((MOST_ELEMENTS, 6)), np.empty((MOST_ELEMENTS, 6)), np.empty(2 * MOST_ELEMENTS + 1),
+    return Scratch(np.empty((MOST_ELEMENTS, ELEMENT_COLUMNS)), np.empty((MOST_ELEMENTS, 6)), np.empty(2 * MOST_ELEMENTS + 1),
                    np.empty(2 * MOST_ELEMENTS, np.int64), np.empty(MOST_ELEMENTS, np.int64), np.empty((DEEPEST + 4, 8)),
                    np.empty((1, 8), rays.ray.dtype), np.empty((LINE_ROWS, 8)))
 
@@ -140,9 +141,9 @@ def here(line, lane, t):
 @inline
 def softness(element, k, x, x1, y, y1, z, z1):
     """Element k's w at a point, as a pair, and the way there from its middle."""
-    x, x1 = add(x, x1, -element[k, X], 0.0)
-    y, y1 = add(y, y1, -element[k, Y], 0.0)
-    z, z1 = add(z, z1, -element[k, Z], 0.0)
+    x, x1 = add(x, x1, -element[k, X], -element[k, REST])
+    y, y1 = add(y, y1, -element[k, Y], -element[k, REST + 1])
+    z, z1 = add(z, z1, -element[k, Z], -element[k, REST + 2])
     a, a1 = square(x, x1)
     b, b1 = square(y, y1)
     a, a1 = add(a, a1, b, b1)

@@ -11,7 +11,7 @@ import numpy as np
 from rtcore.expansions import LONG, expand, put_products
 from rtcore.jit import inline, inline_new, kernel, out_of_line
 from rtcore.pairs import add, divide, multiply, scale, square, square_root, two_product, two_sum
-from rtcore.shapes._blob import RADIUS, ROUGH, STRENGTH
+from rtcore.shapes._blob import RADIUS, REST, ROUGH, STRENGTH
 from rtcore.shapes._separate import between, stationary_of, value_at
 from rtcore.shapes._unit import line_expanded
 from rtcore.shapes.kind import BACK, FRONT
@@ -56,7 +56,7 @@ def spans_of(n, v, element, count, span, weight):
     a, a1 = dot_pairs(v, v)
     for k in range(count):
         for j in range(3):
-            g[j, 0], g[j, 1] = add(n[j, 0], n[j, 1], -element[k, j], 0.0)
+            g[j, 0], g[j, 1] = add(n[j, 0], n[j, 1], -element[k, j], -element[k, REST + j])
         b, b1 = dot_pairs(g, v)
         r, r1 = two_product(element[k, RADIUS], element[k, RADIUS])
         c, c1 = dot_pairs(g, g)
@@ -92,8 +92,8 @@ def sign_at(f, v, s, s1, x, x1, element, count, threshold):
         terms[0], terms[1], n = r, r1, 2
         for k in range(3):
             more = terms[n:]
-            more[:LONG], more[LONG] = at[k], -element[i, k]
-            expand(more, LONG + 1, g[k])
+            more[:LONG], more[LONG], more[LONG + 1] = at[k], -element[i, k], -element[i, REST + k]
+            expand(more, LONG + 2, g[k])
             n = put_products(terms, n, -1.0, g[k], g[k])
         expand(terms, n, w)
         if w[0] <= 0:

@@ -11,8 +11,8 @@ from rtcore.jit import inline, kernel
 from rtcore.lanes import along, dot, greatest, load, root, size, store, vec3
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import advance, lowest
-from rtcore.shapes._blob import (ALONG, FROM, HIT, MISS, MORE, MOST_ELEMENTS, NOISE, PARTS, POINT, RADIUS, ROUGH, SHIFT, SPEED, STRENGTH,
-                                 UNSURE, WAY, X, Y, Z, meet, new_scratch, search)
+from rtcore.shapes._blob import (ALONG, ELEMENT_COLUMNS, FROM, HIT, MISS, MORE, MOST_ELEMENTS, NOISE, PARTS, POINT, RADIUS, REST, ROUGH,
+                                 SHIFT, SPEED, STRENGTH, UNSURE, WAY, X, Y, Z, meet, new_scratch, search)
 from rtcore.shapes._softly import settle
 from rtcore.shapes._unit import line_in_pairs
 from rtcore.shapes.kind import OWN, REACH, Kind, Packed, around, forward, normalized, placed, put_placed, unit_hit
@@ -73,13 +73,16 @@ class Blob(Shape, frozen=True):
             middle = np.round((low / 2 + high / 2) / scale * 2.0 ** 20) * 2.0 ** -20 * scale
             local = matrix @ np.array([[scale, 0, 0, middle[0]], [0, scale, 0, middle[1]], [0, 0, scale, middle[2]], [0, 0, 0, 1]])
             back = invertible(local)
-            unit = np.column_stack([centers / scale - middle / scale, radii / scale])
-            unit *= np.minimum(1, MOST / unit[:, 3:])
+            places = centers / scale - middle / scale
+            back_again = places + middle / scale
+            rest = (centers / scale - back_again) + ((back_again - places) - middle / scale)    # of that difference, exactly
+            unit = np.column_stack([places, radii / scale, rest])
+            unit *= np.minimum(1, MOST / unit[:, 3:4])
             strong = np.ldexp(1.0, -np.frexp(np.abs(strengths).max())[1])
-            rows = np.column_stack([unit, strengths * strong])[(unit[:, 3] >= LEAST) & (strengths != 0)]
-            extra = np.column_stack(halves(rows))
+            kept = (unit[:, 3] >= LEAST) & (strengths != 0)
+            extra = np.column_stack([*halves(np.column_stack([unit[:, :4], strengths * strong])), unit[:, 4:]])[kept]
         exact = [*parts(moved(matrix, middle), 3), *parts([x / Fraction(scale) for row in inverse(matrix) for x in row], 3)]
-        return Packed(BLOB, placed(local, back, *halves(self.threshold * strong), 0.0, len(rows))[None], extra, exact=np.array([exact]))
+        return Packed(BLOB, placed(local, back, *halves(self.threshold * strong), 0.0, len(extra))[None], extra, exact=np.array([exact]))
 
 
 def halves(x):
@@ -95,6 +98,8 @@ def take_elements(element, data, q, extra):
     for k in range(count):
         for j in range(PARTS):
             element[k, j] = np.float64(extra[first + k, j]) + np.float64(extra[first + k, PARTS + j])
+        for j in range(3):
+            element[k, REST + j] = extra[first + k, 2 * PARTS + j]
         element[k, ROUGH] = abs(element[k, STRENGTH]) * (1 + 4 / element[k, RADIUS])
     return count
 
@@ -197,7 +202,7 @@ def gradient(element, count, threshold, x, y, z):
 @kernel
 def surface(rays, n, out, table, first):
     last, taken, count, threshold = first + table.data.shape[0], -1, 0, 0.0
-    data, element = table.data, np.empty((MOST_ELEMENTS, PARTS + 1))
+    data, element = table.data, np.empty((MOST_ELEMENTS, ELEMENT_COLUMNS))
     for i in range(n):
         if first <= rays.prim[i] < last:
             q = rays.prim[i] - first
@@ -228,7 +233,7 @@ def surface(rays, n, out, table, first):
 
 def _bounds(data, extra):
     owner = np.repeat(np.arange(len(data)), data[:, COUNT].astype(int))
-    element, m = extra[:, :PARTS] + extra[:, PARTS:], forward(data)
+    element, m = extra[:, :PARTS] + extra[:, PARTS:2 * PARTS], forward(data)
     middle = data[owner, :3] + np.einsum("nij,nj->ni", m[owner], element[:, :3])
     half = element[:, RADIUS, None] * np.sqrt((m[owner] ** 2).sum(2)) + 1e-12 * data[owner, REACH, None]
     low, high, adds = np.full((len(data), 3), np.inf), np.full((len(data), 3), -np.inf), element[:, STRENGTH] > 0
