@@ -36,7 +36,7 @@ SLOTS = 8               # rays walked in turns; a power of two
 BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6, 9, 12, 13, 14, 15
 BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
 
-#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than that; or they are walked singly.
+#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than that; others scatter.
 STRAIGHT, SPREAD = np.float32(0.4), np.float32(0.35)
 
 
@@ -67,8 +67,8 @@ def new_walk(rays):
 
 @inline
 def begin(walk, rays, start, n, tree, singly):
-    """Bring the packet of rays start .. min(start + 64, n) to the tree's root. singly: how many nodes a tree must have for rays that
-    scatter to be walked singly."""
+    """Bring the packet of rays start .. min(start + 64, n) to the tree's root. singly: how many nodes a tree must have for rays
+    that scatter to be walked singly, which costs less where nodes come from memory."""
     eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
     frame, coarse, fine, state = tree.frame, walk.coarse, walk.fine, walk.state
     groups = min(GROUPS, (n - start + 7) // 8)

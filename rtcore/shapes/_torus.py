@@ -126,8 +126,6 @@ def polish(f, f1, v, v1, t, k, k1, four, four1, far, speed):
 def first_root(todo, course, middle, speed, f, f1, v, v1, k, k1, four, four1, far, start, end, side, sharp):
     """Where the lanes `todo` first cross the torus between start and end; `course` is what `isolate` gave. Returns t, the lanes that
     found it, and those for which this arithmetic isn't certain. Not `sharp`: t is good for float32, and the pairs f .. four1 don't matter.
-
-    No array may come in here: numba counts references to those that a function with branches is given, in the hottest of loops.
     """
     fuzz, (p, q, c), reach, first, second, third = course
     t, lo, inverse = 0 * middle, -reach, 1 / speed
