@@ -1,5 +1,7 @@
 """What all tests share: the folder of scenes from elsewhere, hypothesis profiles, and a platform for Qt that needs no display."""
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import hypothesis
@@ -15,6 +17,13 @@ hypothesis.settings.load_profile("ci" if os.environ.get("CI") else "default")
 def pytest_addoption(parser):
     parser.addoption("--scenes", metavar="DIR", type=Path, default=None,
                      help="folder of scenes from elsewhere (spd/, spd-small/, meshes/); without it, tests that need them are skipped")
+
+
+def pytest_collection_finish(session):
+    """The whole suite needs every kernel: compiled by as many processes as there are processors, they take half the time."""
+    if len(session.items) > 2000 and not session.config.option.collectonly:
+        root = Path(__file__).parent.parent
+        subprocess.run([sys.executable, "-m", "app", "warm"], cwd=root, stderr=subprocess.DEVNULL, check=True, timeout=280)
 
 
 @pytest.fixture(scope="session")
