@@ -11,14 +11,14 @@ from rtcore.api import Hits, Image, intersect, occluded, render
 from rtcore.camera import Camera
 from rtcore.fields import FieldError
 from rtcore.files import FileError, load, save
-from rtcore.lights import Ambient, Directional, Point
+from rtcore.lights import Ambient, Directional, Point, RectangleLight, SphereLight
 from rtcore.scene import (Background, Checker, Fog, Material, Matrix, Node, Rotate, Scale, Scene, Shear, Translate)
 from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
 
 __all__ = ["Ambient", "Background", "Blob", "Box", "Camera", "Checker", "Cone", "Cylinder", "Directional", "FieldError", "FileError",
            "Fog", "Hits", "Image", "Implicit", "Material", "Matrix", "Mesh", "Node", "Plane", "Point", "Polygon", "Polyhedron", "Quadric",
-           "Rotate", "Scale", "Scene", "Shear", "Sphere", "Torus", "Translate", "Triangle", "crossings", "intersect", "load", "occluded",
-           "render", "save"]
+           "RectangleLight", "Rotate", "Scale", "Scene", "Shear", "Sphere", "SphereLight", "Torus", "Translate", "Triangle", "crossings",
+           "intersect", "load", "occluded", "render", "save"]
 __version__ = "0.1.0"
 
 

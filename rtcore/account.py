@@ -15,6 +15,8 @@ from rtcore.shapes import KINDS
 #: Kinds as one speaks of several of them.
 PLURALS = {"box": "boxes", "cone": "cones and cylinders", "torus": "tori", "polyhedron": "polyhedra", "open-polyhedron": "open polyhedra",
            "open-quadric": "open quadrics", "implicit": "formulas"}
+#: Lights as an adjective.
+LIGHT_WORDS = {"spherelight": "spherical", "rectanglelight": "rectangular"}
 #: Stages as the end of "it spends a tenth of its time on ...".
 WORDS = {"primary rays": "casting the eye's rays", "depth of field": "the lens", "surface at the hits": "points and normals where they hit",
          "reflected and refracted rays": "sending reflected and refracted rays on",
@@ -93,7 +95,7 @@ def _words(stage: str) -> str:
     sort, _, name = stage.partition(": ")
     if sort == "hits":
         return f"finding where rays meet {plural(name)}"
-    return f"{name} light" if sort == "light" else WORDS.get(stage, stage)
+    return f"{LIGHT_WORDS.get(name, name)} light" if sort == "light" else WORDS.get(stage, stage)
 
 
 def _series(words: list[str]) -> str:

@@ -7,13 +7,13 @@ of one sequence differs from that of another by tells the error of their mean; h
 
 Dimensions come in pairs. Pair 0 is where in the pixel the sample lies; its sample 0 is the pixel's centre: of all scramblings of the first
 sequence those are taken that bring its first point there, so it is one of the stratified points and counts as any other. `centered` does
-the same for other pairs: so a picture of one sample is free of noise.
+the same for other pairs: so a picture of one sample is free of noise, its shadows those of the lights' middles.
 """
 import numpy as np
 
 from rtcore.jit import inline
 
-LENS = 1            # the pair of dimensions for a place on the lens
+LENS, LIGHTS = 1, 2     # pairs of dimensions: the place on the lens; the first one for places on lights
 REPLICATES = 2      # more would tell the error better and make it larger: edges converge as R^(1/4) N^(-3/4)
 
 

@@ -11,9 +11,10 @@ from rtcore.eye import cast, cast_list
 from rtcore.flatten import Geometry, nbytes
 from rtcore.lanes import LANES
 from rtcore.lens import bend
-from rtcore.lights import SHINE
+from rtcore.lights import SAMPLED, SHINE, Draw
 from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
+from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
 from rtcore.wave import NO_ANSWER, Wave, new_beam, new_wave, padded
@@ -33,6 +34,7 @@ class Lamp(NamedTuple):
     shine: Callable
     numbers: np.ndarray
     color: np.ndarray
+    sampled: bool           # it has an extent
 
 
 class Clock:
@@ -105,8 +107,9 @@ class Tracer:
                  background: Background, fog: Fog | None):
         self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
-        self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity))
-                      for light in plan.lights]
+        self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity),
+                           isinstance(light, SAMPLED)) for light in plan.lights]
+        self.numbered = lens is not None or any(lamp.sampled for lamp in self.lamps)    # something asks which sample a ray belongs to
         self.fog = fogs.numbers(fog) if plan.fog else None
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
@@ -115,7 +118,8 @@ class Tracer:
         wave = scratch.primary(int(tile[2] * tile[3]))
         scratch.clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
-        scratch.number[:n] = sample
+        if self.numbered:
+            scratch.number[:n] = sample
         return n == 0 or film.count[scratch.target[0]] > sample or self._trace(scratch, film, wave, n, sample == 0, stale)
 
     def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
@@ -126,7 +130,8 @@ class Tracer:
         wave = scratch.primary(int(each.sum()))
         scratch.clock.start()
         n = cast_list(wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)
-        scratch.number[:n] = np.arange(n) - np.repeat(np.cumsum(each) - pixels[:, 2], each)
+        if self.numbered:
+            scratch.number[:n] = np.arange(n) - np.repeat(np.cumsum(each) - pixels[:, 2], each)
         return self._trace(scratch, film, wave, n, False, stale)
 
     def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, first: bool, stale: Callable[[], bool]) -> bool:
@@ -158,7 +163,7 @@ class Tracer:
         for depth in range(1, self.settings.max_depth + 1):
             if depth > 1:
                 self.hit(clock, wave, n)
-            self._light(scratch, wave, n, counts)
+            self._light(scratch, wave, n, depth, counts)
             if self.fog is not None:
                 fogs.dim(wave, n, self.fog)
                 clock.lap("fog", "fog")
@@ -184,7 +189,7 @@ class Tracer:
             group.kind.surface(wave.rays, n, wave.surface, group.table, group.first)
             clock.lap("surface at the hits", group.kind.name)
 
-    def _light(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray) -> None:
+    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray) -> None:
         clock = scratch.clock
         if not self.lamps:
             shading.glow(wave, n, self.look, NO_ANSWER)
@@ -194,10 +199,12 @@ class Tracer:
         beam = scratch.beams(n, together)
         shading.glow(wave, n, self.look, beam.answer)
         clock.lap(GLOW, "glow")
-        for lamps in (self.lamps[k:k + together] for k in range(0, len(self.lamps), together)):
-            m = 0
-            for lamp in lamps:
-                m = lamp.shine(wave, n, lamp.numbers, lamp.color, beam, m)
+        pairs = LIGHTS + depth * len(self.lamps)
+        for k in range(0, len(self.lamps), together):
+            m, lamps = 0, self.lamps[k:k + together]
+            for j, lamp in enumerate(lamps, k):
+                draw = (Draw(scratch.target, scratch.number, pairs + j, self.settings.seed),) if lamp.sampled else ()
+                m = lamp.shine(wave, n, lamp.numbers, lamp.color, beam, m, *draw)
                 clock.lap(f"light: {lamp.name}", f"light-{lamp.name}")
             if m == 0:
                 continue

@@ -12,7 +12,7 @@ import numpy as np
 from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
-from rtcore.lights import SHINE
+from rtcore.lights import SAMPLED, SHINE, Draw
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
@@ -104,8 +104,9 @@ def _bounce(dtype):
 
 def _light(kind):
     def compile_light(dtype):
-        wave, _, n = _wave(dtype)
-        SHINE[kind](wave, 0, np.zeros(4), np.zeros(3), new_beam(n, 1, dtype), 0)
+        wave, target, n = _wave(dtype)
+        draw = (Draw(target, target, 2, 0),) if kind in SAMPLED else ()
+        SHINE[kind](wave, 0, np.zeros(4), np.zeros(3), new_beam(n, 1, dtype), 0, *draw)
     return compile_light
 
 

@@ -52,7 +52,8 @@ assert sum(len(signatures) > 0 for signatures, _ in before.values()) > 20, befor
 glass = Material(diffuse=0.2, reflection=1, transmission=0.8, fresnel=True, checker=Checker())
 flat = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)] * 6)
 smooth = Mesh(flat.vertices, flat.faces, normals=[(0, 0, 1)] * 4)
-lights = [Point(position=(0, 9, 0)), Point(position=(1, 9, 0), falloff="constant"), Directional(direction=(1, -1, 0)), Ambient()]
+lights = [Point(position=(0, 9, 0)), Point(position=(1, 9, 0), falloff="constant"), Directional(direction=(1, -1, 0)), Ambient(),
+          SphereLight(position=(0, 8, 0)), RectangleLight(position=(0, 7, 0))]
 for precision in ("f64", "f32"):
     for fog in (None, Fog(), Fog(kind="linear"), Fog(kind="exponential-squared")):
         for mesh in (flat, smooth):
@@ -63,6 +64,7 @@ for precision in ("f64", "f32"):
             image = rtcore.render(scene, (24, 16), 2, precision=precision, error=1e-9)
             assert image.stats["rays"]["refraction"] > 0
     assert rtcore.render(scene, (24, 16), 12, precision=precision, adaptive=True).stats["samples"]["most"] > 8
+    rtcore.render(Scene(objects=[flat], camera=Camera(aperture=0.1)), (24, 16), 2, precision=precision)
     for view in ("normal", "depth", "object", "error"):
         rtcore.render(scene, (24, 16), precision=precision, view=view)
     hits = rtcore.intersect(scene, [(0, 0, -5)] * 20, [(0, 0, 1)] * 20, precision=precision)
