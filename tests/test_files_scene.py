@@ -259,7 +259,8 @@ WRONG = {
     HEAD + "camera:\n  fov: 180\nscene: []\n":
         "line 3: camera.fov: expected a number greater than 0 and less than 180, got 180",
     HEAD + "lights:\n  - pont: {position: [0, 0, 0]}\nscene: []\n":
-        "line 3: lights[0].pont: expected one of point, directional, ambient, spherelight, rectanglelight, got 'pont' (did you mean 'point'?)",
+        "line 3: lights[0].pont: expected one of point, directional, ambient, spherelight, "
+        "rectanglelight, got 'pont' (did you mean 'point'?)",
     HEAD + "materials:\n  a.b[0]:\n    color: [2, 0, 0]\nscene: []\n":
         "line 4: materials.a.b[0].color: expected a colour whose parts are at least 0 and at most 1, got [2, 0, 0]",
     HEAD + "materials: {a: {checker: {size: 0}}}\nscene: []\n":
