@@ -79,3 +79,22 @@ def test_along_the_surface(shape, precision):
         distance = rng.choice([0, 1, 10], (len(point), 1))
         met += check(scene, *rounded(matrix, target - distance * way, target + way * (distance == 0), precision), precision)
     assert met > (5 if shape is Plane else 15)
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+def test_from_close_to_a_face(precision):
+    """Of a ray that starts beside a face, t is a difference in which nearly all digits may cancel; it is the right number all the same."""
+    rng, seen = np.random.default_rng(8), 0
+    for record, scene, matrix in places(rng, Box, precision):
+        low, high = np.array(record.low), np.array(record.high)
+        middle, half = (low + high) / 2, (high - low) / 2
+        faces, way = rng.uniform(-1, 1, (60, 3)), rng.normal(size=(60, 3))
+        axis = np.arange(60) % 3
+        faces[np.arange(60), axis] = np.where(way[np.arange(60), axis] > 0, -1, 1) * (1 + 10 ** rng.uniform(-17, -2, 60))
+        o, d = rounded(matrix, middle + faces * half, middle + (faces + way) * half, precision)
+        for ray, along, t in zip(o, d, rtcore.intersect(scene, o, d, precision=precision).t):
+            true = rtcore.crossings(scene, ray, along, precision)
+            first = min(true[true > 0], default=np.inf)
+            assert t == first or abs(t - first) <= np.spacing(DTYPE[precision](first)), (scene.objects, ray.tolist(), along.tolist())
+            seen += first < 0.01
+    assert seen > 100

@@ -1,4 +1,5 @@
-"""Box: the unit cube -1 .. 1 by slabs, placed by a matrix; in plain float64 with a bound on its errors first, then in double-double."""
+"""Box: the unit cube -1 .. 1 by slabs, placed by a matrix; in plain float64 with a bound on its errors first, then in double-double, and in
+some hundred digits where most of those cancel."""
 from fractions import Fraction
 from typing import Annotated
 
@@ -7,16 +8,18 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
-from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, greatest, least, load, load3, rounded, select, size, splat3, wide, with_sign
+from rtcore.expansions import LONG, expand
+from rtcore.jit import inline, kernel, out_of_line
+from rtcore.lanes import any_lane, bits, greatest, least, load, load3, rounded, select, size, splat3, wide, with_sign
 from rtcore.pairs import divide, subtract
 from rtcore.scene import Shape, invertible
-from rtcore.shapes._ball import U64, extent
-from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_in_pairs
+from rtcore.shapes._ball import U64, extent, lowest
+from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs
 from rtcore.shapes.kind import FRONT, OWN, Kind, Packed, forward, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, alive, record, until
+from rtcore.wave import DX, OX, SLOW, START, alive, record, record_one, until
 
 HALF = BEYOND       # columns of Table.exact: half the box's edges, in two parts
+NEAR = 2.0 ** -60   # what t may be off, as a share of it, before pairs will not do
 
 
 class Box(Shape, frozen=True):
@@ -78,43 +81,83 @@ def crossing(face, face1, f, f1, v, v1):
 
 
 @inline
-def later(enter, enter1, f, f1, v, v1, half, half1):
-    """The later one of `enter` and where a slab is entered, in pairs. A ray along the slab is in it always or never."""
+def later(enter, enter1, pace, f, f1, v, v1, half, half1):
+    """The later one of `enter` and where a slab is entered, in pairs, and the v of that slab. A ray along it is in it always or never."""
     t, t1 = crossing(-with_sign(half, v), -half1 * with_sign(1 + 0 * v, v), f, f1, v, v1)
     along = v == 0
     sign = with_sign(1 + 0 * f, f)
     beside = (sign * f - half) + (sign * f1 - half1) > 0
     t = select(along, select(beside, np.inf, 0 * f - np.inf), t)
     more = (t > enter) | ((t == enter) & (t1 > enter1))
-    return select(more, t, enter), select(more, select(along, 0, t1), enter1)
+    return select(more, t, enter), select(more, select(along, 0, t1), enter1), select(more, v, pace)
 
 
 @inline
-def earlier(leave, leave1, f, f1, v, v1, half, half1):
-    """The earlier one of `leave` and where a slab is left."""
+def earlier(leave, leave1, pace, f, f1, v, v1, half, half1):
+    """The earlier one of `leave` and where a slab is left, likewise."""
     t, t1 = crossing(with_sign(half, v), half1 * with_sign(1 + 0 * v, v), f, f1, v, v1)
     less = ((t < leave) | ((t == leave) & (t1 < leave1))) & ~(v == 0)
-    return select(less, t, leave), select(less, t1, leave1)
+    return select(less, t, leave), select(less, t1, leave1), select(less, v, pace)
 
 
 @inline
-def meet(ray, i, exact, q, todo, side):
-    """Where the lanes `todo` meet box q, in the rays' precision, and whether they do; in double-double. Rays that miss an edge by less than
-    2⁻⁹⁸ of the way count as touching it."""
+def meet(ray, i, exact, q, most, todo, side):
+    """Where the lanes `todo` meet box q, in the rays' precision, whether they do, and for which that is left to `settle`; in double-double.
+    Rays that miss an edge by less than 2⁻⁹⁸ of the way count as touching it."""
     f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
     half, half1, start, zero = splat3(exact, q, HALF), splat3(exact, q, HALF + 3), load(ray, START, i), 0 * f.x
-    enter, enter1 = later(zero - np.inf, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
-    enter, enter1 = later(enter, enter1, f.y, f1.y, v.y, v1.y, half.y, half1.y)
-    enter, enter1 = later(enter, enter1, f.z, f1.z, v.z, v1.z, half.z, half1.z)
-    leave, leave1 = earlier(zero + np.inf, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
-    leave, leave1 = earlier(leave, leave1, f.y, f1.y, v.y, v1.y, half.y, half1.y)
-    leave, leave1 = earlier(leave, leave1, f.z, f1.z, v.z, v1.z, half.z, half1.z)
+    far = 16 * U64 ** 2 * (most * extent(wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) + 1)
+    speed = 8 * U64 ** 2 * most * extent(wide(load3(ray, DX, i)))
+    enter, enter1, pace = later(zero - np.inf, zero, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
+    enter, enter1, pace = later(enter, enter1, pace, f.y, f1.y, v.y, v1.y, half.y, half1.y)
+    enter, enter1, pace = later(enter, enter1, pace, f.z, f1.z, v.z, v1.z, half.z, half1.z)
+    leave, leave1, pace1 = earlier(zero + np.inf, zero, zero, f.x, f1.x, v.x, v1.x, half.x, half1.x)
+    leave, leave1, pace1 = earlier(leave, leave1, pace1, f.y, f1.y, v.y, v1.y, half.y, half1.y)
+    leave, leave1, pace1 = earlier(leave, leave1, pace1, f.z, f1.z, v.z, v1.z, half.z, half1.z)
     ok = todo & (enter < np.inf) & ((leave - enter) + (leave1 - enter1) >= -2.0 ** -98 * (size(enter) + size(leave)))
-    t = rounded(enter, start)
-    t = select(t > start, t, rounded(leave, start))
+    t, last = rounded(enter, start), rounded(leave, start)
+    outside, begin = wide(t) > wide(start), wide(start)
+    # in doubt: the t that is wanted, or whether the ray starts before it enters; h and v are off by `far` and `speed`
+    off, off1 = far + size(enter) * speed, far + size(leave) * speed
+    close, close1 = off > NEAR * size(enter * pace), off1 > NEAR * size(leave * pace1)
+    unsure = (outside & close) | (~outside & (((enter - begin) * size(pace) + off > 0) | close1))
+    t = select(t > start, t, last)
     if side != 0:
-        t = rounded(enter, start) if side & FRONT else rounded(leave, start)
-    return t, ok
+        t = rounded(enter, start) if side & FRONT else last
+        unsure = close | close1
+    return t, ok & ~unsure, ok & unsure
+
+
+@kernel
+def settle(rays, i, p, exact, q, side, opacity):
+    """Record where ray i alone meets box q, the slow and certain way."""
+    out_of_line()
+    rays.tally[SLOW] += 1
+    f, v, h, terms = np.empty((3, LONG)), np.empty((3, LONG)), np.empty(LONG), np.empty(2 * LONG + 2)
+    line_expanded(rays.ray, i, exact, q, f, v)
+    enter, enter1, leave, leave1 = -np.inf, 0.0, np.inf, 0.0
+    for k in range(3):
+        for way in (-1.0, 1.0):
+            sign = way if v[k, 0] >= 0 else -way
+            terms[0], terms[1], terms[2:2 + LONG] = sign * exact[q, HALF + k], sign * exact[q, HALF + 3 + k], -f[k]
+            expand(terms, 2 + LONG, h)
+            if v[k, 0] == 0:
+                if sign * h[0] < 0:
+                    return
+                continue
+            t, t1 = divide(h[0], h[1], v[k, 0], v[k, 1])
+            if way < 0 and (t > enter or t == enter and t1 > enter1):
+                enter, enter1 = t, t1
+            elif way > 0 and (t < leave or t == leave and t1 < leave1):
+                leave, leave1 = t, t1
+    if (leave - enter) + (leave1 - enter1) < -2.0 ** -98 * (abs(enter) + abs(leave)):
+        return
+    first = np.float64(np.float32(enter)) if rays.ray.itemsize == 4 else enter
+    if side == 0:
+        t = first if first > rays.ray[START, i] else leave
+    else:
+        t = first if side & FRONT else leave
+    record_one(rays, i, p, t, opacity)
 
 
 @kernel
@@ -131,8 +174,12 @@ def intersect(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         todo = approach(rays.ray, i, table.exact, q, most)
                         if any_lane(todo):
-                            t, ok = meet(rays.ray, i, table.exact, q, todo, table.side[q])
+                            t, ok, unsure = meet(rays.ray, i, table.exact, q, most, todo, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
+                            late = bits(unsure)
+                            while late:
+                                settle(rays, i + lowest(late), first + q, table.exact, q, table.side[q], opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             leaf = next_leaf(walk, tree, table)
 
