@@ -178,16 +178,19 @@ def test_what_memory_there_is():
 
 
 def test_kernels_that_are_missing_are_compiled_with_progress(scene, run, monkeypatch):
+    from app import compiling
     from rtcore import warm
-    told = []
+    told, shown = [], []
     monkeypatch.setattr(warm, "missing", lambda scene, settings: ["core.f64"])
+    monkeypatch.setattr(_progress.Progress, "show", lambda self, share, doing="", left=None: shown.append((share, doing)))
 
-    def compile_kernels(names, progress=lambda *_: None):
+    def compile_kernels(self, names, progress):
         told.append(names)
-        for done in (0, 1):
-            progress(done, 1, "core.f64")
-    monkeypatch.setattr(warm, "compile_kernels", compile_kernels)
-    assert run("render", scene, "-o", "a.png", "--size", "8x8", "--spp", 1)[0] == 0 and told[0] == ["core.f64"]
+        progress(compiling.Compiling(0, 1, ("core.f64",)))
+        return ""
+    monkeypatch.setattr(compiling.Compiler, "compile", compile_kernels)
+    assert run("render", scene, "-o", "a.png", "--size", "8x8", "--spp", 1)[0] == 0
+    assert told == [["core.f64"]] and shown[0][0] == 0 and "core" in shown[0][1]
 
 
 # --- Ctrl-C ---

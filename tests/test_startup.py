@@ -19,7 +19,8 @@ listener = event.RecordingListener()
 with event.install_listener("numba:compile", listener):
     import rtcore
     for module in list(pkgutil.walk_packages(rtcore.__path__, "rtcore.")):
-        importlib.import_module(module.name)
+        if not module.name.endswith("_process"):    # programs of their own, for rivals that may not be installed
+            importlib.import_module(module.name)
 kernels = [value for name, module in list(sys.modules.items()) if name.startswith("rtcore.") for value in vars(module).values()
            if isinstance(value, Dispatcher)]
 print(len(kernels) > 100, len(listener.buffer), sum(len(kernel.signatures) for kernel in kernels))
@@ -66,7 +67,7 @@ def test_a_render_imports_and_loads_only_what_it_needs(tmp_path):
     python(code)        # once, in case kernels have to be compiled
     exit_code, kernels, *imported = python(code).split()
     assert exit_code == "0" and imported == []
-    assert int(kernels) == 16       # 5 for any picture, 2 for its light, 3 for lights, 1 for bounces, 1 for boxes, 2 for each of two kinds
+    assert int(kernels) == 15       # 5 for any picture, 2 for its light, 2 for lights, 1 for bounces, 1 for boxes, 2 for each of two kinds
 
 
 @pytest.mark.parametrize("name", ["crossings", "render", "Sphere"])

@@ -125,8 +125,8 @@ def trace(scene, camera, settings, interrupted):
                 else:
                     forecast.note(frame.elapsed, frame.mean, frame.error)
                     ends = forecast.left(settings.samples, None, settings.error) if frame.error else None
-                    left = sum(ends) / 2 if ends else math.inf
-                    bar.show(used / (used + left), f"{frame.mean:.4g}{aim}", left if ends else None)
+                    left = 0.0 if frame.done else sum(ends) / 2 if ends else math.inf
+                    bar.show(used / (used + left), f"{frame.mean:.4g}{aim}", left if left < math.inf else None)
         if frame is None:
             return None, {}
         return frame.pixels if frame.done else renderer.picture(), renderer.stats()
