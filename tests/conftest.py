@@ -35,3 +35,18 @@ def scenes(request) -> Path:
     if not folder.is_dir():
         raise pytest.UsageError(f"--scenes {folder}: expected a folder, got none")
     return folder.resolve()
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch) -> Path:
+    """A small scene in the current folder."""
+    from commandline import ball_in
+    monkeypatch.chdir(tmp_path)
+    return ball_in(tmp_path)
+
+
+@pytest.fixture
+def run(capsys):
+    """Runs a command line in this process: exit code, stdout, stderr."""
+    from commandline import run_here
+    return lambda *words: run_here(capsys, words)

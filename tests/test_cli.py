@@ -6,25 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from commandline import BALL, ENVIRONMENT, ROOT, ball_in, one_line, picture, process, run_here
+from commandline import BALL, ENVIRONMENT, ROOT, one_line, picture, process
 
 import rtcore
 from app import __main__ as cli
 from app.commands import COMMANDS, _progress, _shared
 from app.commands import render as render_command
-
-
-@pytest.fixture
-def scene(tmp_path, monkeypatch):
-    """A small scene in the current folder."""
-    monkeypatch.chdir(tmp_path)
-    return ball_in(tmp_path)
-
-
-@pytest.fixture
-def run(capsys):
-    """Runs a command line in this process: exit code, stdout, stderr."""
-    return lambda *words: run_here(capsys, words)
 
 
 @pytest.mark.parametrize("command", ["render", "check", "plan", "warm"])

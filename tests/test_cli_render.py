@@ -10,23 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import BALL, ENVIRONMENT, ball_in, one_line, picture, run_here
+from commandline import BALL, ENVIRONMENT, one_line, picture
 
 from app.commands import _progress, _shared
 from app.commands import render as render_command
-
-
-@pytest.fixture
-def scene(tmp_path, monkeypatch):
-    """A small scene in the current folder."""
-    monkeypatch.chdir(tmp_path)
-    return ball_in(tmp_path)
-
-
-@pytest.fixture
-def run(capsys):
-    """Runs a command line in this process: exit code, stdout, stderr."""
-    return lambda *words: run_here(capsys, words)
 
 
 def test_render_writes_the_picture_and_nothing_to_stdout(scene, run):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import ball_in, one_line, run_here
+from commandline import one_line
 
 import rtcore
 from rtcore.progressive import Renderer
@@ -17,17 +17,6 @@ from rtcore.reports.convergence_page import calibration, fitted_slope, page, sec
 from rtcore.settings import Settings
 
 SMALL = "--size", "32x24", "--reference-spp", 64, "--budget", 1
-
-
-@pytest.fixture
-def scene(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return ball_in(tmp_path)
-
-
-@pytest.fixture
-def run(capsys):
-    return lambda *words: run_here(capsys, words)
 
 
 def test_the_report_has_its_files_and_columns(scene, run):
