@@ -22,7 +22,7 @@ class Film(NamedTuple):
     split: np.ndarray       # float32 (h·w, 3): sum of the first replicate's samples less that of the second's
     square: np.ndarray      # float64 (h·w): sum of the samples' squares, the mean over the channels
     count: np.ndarray       # int32 (h·w): how many
-    node: np.ndarray        # int32 (h·w): the leaf that sample 0 hit first, -1 none
+    prim: np.ndarray        # int32 (h·w): the primitive that sample 0 hit first, -1 none
     distance: np.ndarray    # float32 (h·w): how far away, inf none
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
     doubt: np.ndarray       # uint8 (h·w): not 0 where that hit, or that there is none nearer, has no proof
@@ -38,11 +38,11 @@ def new_film(width: int, height: int, samples: int = 2) -> Film:
 
 
 @kernel
-def note_first_hits(film, wave, n, target, leaf):
-    """Which leaf each primary ray hit, how far away, and the normal there."""
+def note_first_hits(film, wave, n, target):
+    """Which primitive each primary ray hit, how far away, and the normal there."""
     for i in range(n):
         prim, p = wave.rays.prim[i], target[i]
-        film.node[p] = leaf[prim] if prim >= 0 else -1
+        film.prim[p] = prim
         film.distance[p] = wave.rays.ray[T, i]
         for k in range(3):
             film.normal[p, k] = wave.surface[NX + k, i] if prim >= 0 else 0
@@ -103,15 +103,15 @@ def develop(film, width, height, spacing, pixels):
 
 
 @kernel
-def fill(film, width, height, spacing, node, distance, normal, doubt):
-    """First hits over the whole picture, (h, w) but for the normals (h, w, 3), as `develop` fills it."""
+def fill(film, leaf, width, height, spacing, node, distance, normal, doubt):
+    """First hits over the whole picture, (h, w) but for the normals (h, w, 3), as `develop` fills it; leaf: that of each primitive."""
     for y in range(height):
         for x in range(width):
             p, step = y * width + x, 1
             while film.count[p] == 0 and step < spacing:
                 step *= 2
                 p = y // step * step * width + x // step * step
-            node[y, x] = film.node[p]
+            node[y, x] = leaf[film.prim[p]] if film.prim[p] >= 0 else -1
             distance[y, x] = film.distance[p]
             doubt[y, x] = film.doubt[p]
             for k in range(3):

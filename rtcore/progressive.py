@@ -205,7 +205,7 @@ class Render:
         pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
         node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
         films.develop(self.film, width, height, COARSEST, pixels)
-        films.fill(self.film, width, height, COARSEST, node, distance, normal, doubt)
+        films.fill(self.film, self.tracer.geometry.leaf, width, height, COARSEST, node, distance, normal, doubt)
         view = VIEW[self.settings.view]
         error = np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
         shown = view.draw(Seen(pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width), error))

@@ -195,7 +195,7 @@ def bounce(wave, n, look, child, counts):
             x, y, z = normalized(x, y, z)
             put_ray(child.rays, count, surface[PX, i] + away * gx, surface[PY, i] + away * gy, surface[PZ, i] + away * gz, x, y, z, np.inf)
             child.weight[0, count], child.weight[1, count], child.weight[2, count] = r, g, b
-            child.owner[count] = wave.owner[i]
+            child.owner[count], child.source[count] = wave.owner[i], 2 * i + way
             counts[way] += 1
             count += 1
     finish(child.rays, count)

@@ -145,7 +145,7 @@ class Tracer:
         self.hit(clock, wave, n)
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
         if first:
-            films.note_first_hits(film, wave, n, scratch.target, self.geometry.leaf)
+            films.note_first_hits(film, wave, n, scratch.target)
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))

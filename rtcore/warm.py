@@ -35,11 +35,11 @@ def _look():
 def _core(dtype):
     wave, target, n = _wave(dtype)
     film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
-    films.note_first_hits(film, wave, n, target, np.zeros(0, np.int32))
+    films.note_first_hits(film, wave, n, target)
     films.commit(film, sample, n, target)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, 8, 8, 1, pixels)
-    films.fill(film, 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
+    films.fill(film, np.zeros(0, np.int32), 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
 
 
 def _lens(dtype):

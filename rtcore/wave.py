@@ -110,6 +110,7 @@ class Wave(NamedTuple):
     weight: np.ndarray      # float32 (3, n): how much of it the pixel gets
     fade: np.ndarray        # float32 (n): what fog lets through
     owner: np.ndarray       # int32 (n): the column of the primary ray it descends from
+    source: np.ndarray      # int32 (n): twice the column of the wave before that it comes from, plus 1 if refracted; not for primary rays
 
 
 class Beam(NamedTuple):
@@ -131,7 +132,7 @@ def new_wave(n: int, dtype) -> Wave:
     rays = new_rays(n, dtype)
     n = rays.ray.shape[1]
     return Wave(rays, np.empty((SHADING_ROWS, n), dtype), np.empty((3, n), np.float32), np.empty((3, n), np.float32),
-                np.empty(n, np.float32), np.empty(n, np.int32))
+                np.empty(n, np.float32), np.empty(n, np.int32), np.empty(n, np.int32))
 
 
 def new_beam(n: int, lights: int, dtype) -> Beam:
