@@ -39,6 +39,12 @@ ACTIONS = (
     Action("fog", "&Fog", "fog", "2", "Show the scene's fog", lambda w, on: w.switch_fog(on), True),
     Action("reflections", "R&eflections", "reflections", "3", "Follow mirrored and refracted light",
            lambda w, on: w.session.switch("reflections", on), True),
+    Action("pause", "&Pause", "pause", "P", "Stop refining the picture, and go on from there; what changes meanwhile is shown with one "
+           "sample per pixel", lambda w, on: w.session.pause(on), True),
+    Action("brighter", "&Brighter", "", ".", "Show the picture half a stop brighter", lambda w: w.session.brighten(0.5)),
+    Action("darker", "&Darker", "", ",", "Show the picture half a stop darker", lambda w: w.session.brighten(-0.5)),
+    Action("unexposed", "As &bright as it is", "", "0", "Show the light as it is, white at 1",
+           lambda w: w.session.brighten(-w.session.options.exposure)),
     Action("panels", "&Panels", "panels", "Ctrl+.", "Show the panels, or only the picture", lambda w, on: w.show_panels(on), True),
     Action("fullscreen", "F&ull screen", "fullscreen", "F11", "Fill the screen with the picture, for the projector",
            lambda w, on: w.fill_screen(on), True),
@@ -53,12 +59,12 @@ MENUS = (
     ("&File", ("open", "<recent>", "gallery", "reload", None, "save", "save_as", "save_picture", None, "quit")),
     ("&Edit", ("undo", "redo")),
     ("&View", ("back", "forward", None, "frame_selection", "frame_all", "reset_view", None, "shadows", "fog", "reflections", None,
-               "<panels>", "<theme>", "panels", "fullscreen", "arrange")),
+               "pause", "brighter", "darker", "unexposed", None, "<panels>", "<theme>", "panels", "fullscreen", "arrange")),
     ("&Help", ("shortcuts", "about")),
 )
 
 TOOLBAR = ("open", "gallery", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection",
-           "frame_all", "reset_view", None, "shadows", "fog", "reflections", "<space>", "panels", "fullscreen", "shortcuts")
+           "frame_all", "reset_view", None, "shadows", "fog", "reflections", None, "pause", "<space>", "panels", "fullscreen", "shortcuts")
 
 #: Shown with their names in the toolbar, because a symbol alone would not tell.
 WORDED = ("gallery", "shadows", "fog", "reflections")

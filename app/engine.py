@@ -23,6 +23,11 @@ class Job(NamedTuple):
     continues: bool = False     # a step of the same drag as the job before: that one may still show its first pass
     document: int = 0           # counts opened files: kernels are compiled anew only for another one
 
+    def looks_like(self, other: "Job") -> bool:
+        """Whether both have the same picture, at most shown brighter or darker; scenes are told apart by identity, as everywhere."""
+        return (self.scene is other.scene and (self.camera, self.size) == (other.camera, other.size)
+                and self.options.looks_like(other.options))
+
 
 class Engine:
     """rtcore's renderer behind the few calls the worker needs. Importing it takes a second: numba comes with it."""
@@ -52,9 +57,9 @@ class Engine:
         """The passes of a picture, from coarse to fine."""
         return self._renderer.frames(request, cancelled)
 
-    def encode(self, pixels: np.ndarray, out: np.ndarray):
-        """Linear light into the bytes of QImage.Format_RGB32."""
-        self._film.encode(pixels, out)
+    def encode(self, pixels: np.ndarray, out: np.ndarray, gain: float):
+        """Linear light, multiplied by the gain, into the bytes of QImage.Format_RGB32."""
+        self._film.encode(pixels, out, gain)
 
     def close(self):
         """End the renderer's threads."""

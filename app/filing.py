@@ -99,7 +99,7 @@ class Filing(QObject):
         session.tasks.run(work, done, lambda error: session.said.emit("error", one_line(error, path)), name="save")
 
     def save_picture(self, path: Path):
-        """Write the picture on the screen: .png in sRGB, .exr in linear light."""
+        """Write the picture on the screen: .png in sRGB and as bright as it is shown, .exr in linear light as it is."""
         session = self._session
         if session.shown is None:
             session.said.emit("error", "There is no picture to save yet.")
@@ -107,14 +107,18 @@ class Filing(QObject):
         shown, path = session.shown, Path(path).absolute()
         text = {"Title": shown.job.scene.name or "Rayscope", "Samples": str(shown.frame.samples),
                 "Camera": msgspec.json.encode(shown.job.camera).decode()}
+        gain = 1.0 if path.suffix.lower() == ".exr" else shown.job.options.gain()
+        if gain != 1:
+            text["Exposure"] = f"{shown.job.options.exposure:+g} stops"
 
         def work():
             from rtcore.files import save_image
-            save_image(shown.frame.pixels, path, text=text)
+            save_image(shown.frame.pixels * gain if gain != 1 else shown.frame.pixels, path, text=text)
 
         def done(_):
             left = "" if shown.frame.done else ", unfinished as it was"
-            session.said.emit("info", f"Saved {path.name}{left}")
+            as_is = ", the light as it is and not as exposed here" if shown.job.options.gain() != gain else ""
+            session.said.emit("info", f"Saved {path.name}{left}{as_is}")
 
         session.tasks.run(work, done, lambda error: session.said.emit("error", one_line(error, path)), name="save picture")
 

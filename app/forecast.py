@@ -1,4 +1,5 @@
 """How long a picture will take yet, from how fast it went so far."""
+import math
 from typing import NamedTuple
 
 LEAST = 0.05        # seconds between two points that a speed is taken from
@@ -33,7 +34,7 @@ class Forecast:
 
     def left(self, samples: float, seconds: float | None = None, error: float | None = None) -> tuple[float, float] | None:
         """Seconds until there are so many samples per pixel, or so many seconds are over, or the error is so low, whichever is first: at
-        the least and at the most. None as long as nothing can be said."""
+        the least and at the most. None as long as nothing can be said, and where no end is set."""
         paces = [(b.samples - a.samples) / (b.seconds - a.seconds) for a, b in zip(self._points, self._points[1:])]
         paces = [pace for pace in paces if pace > 0]
         if not paces:
@@ -47,7 +48,8 @@ class Forecast:
             factor = max(now.error / error, 1.0)
             late, early = (now.seconds * (factor ** (-1 / slope) - 1) for slope in SLOPES)
             ends.append((early, late))
-        return min(end[0] for end in ends), min(end[1] for end in ends)
+        low, high = min(end[0] for end in ends), min(end[1] for end in ends)
+        return (low, high) if math.isfinite(high) else None
 
 
 def left_text(left: tuple[float, float] | None) -> str:

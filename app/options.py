@@ -1,8 +1,12 @@
 """What the window asks of the renderer besides scene and camera: the toolbar's switches and the Render panel's numbers."""
 from typing import Annotated
 
+import msgspec
+
 from rtcore.fields import Choice, FieldError, Flag, Maybe, Number, Record
 from rtcore.settings import VIEW_NAMES
+
+MOST_SAMPLES = 1 << 20      # what the renderer is asked for where no end is set
 
 
 class Options(Record, frozen=True, kw_only=True):
@@ -12,9 +16,11 @@ class Options(Record, frozen=True, kw_only=True):
     fog: Annotated[bool, Flag(help="show the scene's fog")] = True
     reflections: Annotated[bool, Flag(help="follow mirrored and refracted light")] = True
     view: Annotated[str, Choice(words=VIEW_NAMES, help="what is shown of the picture; a switch traces nothing")] = "beauty"
+    exposure: Annotated[float, Number(least=-10, most=10, help="how bright it is shown; one stop doubles it. PNG files are as shown, EXR "
+                                      "files keep the light as it is", unit="stops")] = 0.0
     adaptive: Annotated[bool, Flag(help="put the samples where the error is: the number of samples is then their mean")] = True
-    samples: Annotated[int, Number(least=1, most=65536, help="rays through each pixel once the picture is finished")] = 16
-    seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after so many seconds, though samples are missing")] = None
+    samples: Annotated[int | None, Maybe(inner=Number(least=1, most=MOST_SAMPLES), help="stop after so many rays through each pixel")] = 16
+    seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after so many seconds of tracing")] = None
     error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop once the estimated error is so low (white is 1)")] = None
     scale: Annotated[float, Number(least=0.1, most=2, help="resolution of the picture against that of the screen")] = 1.0
     max_depth: Annotated[int, Number(least=1, most=64, help="longest chain of rays, the eye's included")] = 5
@@ -25,11 +31,19 @@ class Options(Record, frozen=True, kw_only=True):
     def check(self):
         for name in ("samples", "max_depth", "threads", "seed"):
             value = getattr(self, name)
-            if value != int(value):
+            if value is not None and value != int(value):
                 raise FieldError("a whole number", value, name)
+
+    def gain(self) -> float:
+        """What the light is multiplied by to be shown. False colours are no light and stay as they are."""
+        return 2.0 ** self.exposure if self.view == "beauty" else 1.0
+
+    def looks_like(self, other: "Options") -> bool:
+        """Whether both have the same picture, at most shown brighter or darker."""
+        return msgspec.structs.replace(self, exposure=other.exposure) == other
 
     def settings(self) -> dict:
         """The keyword arguments of `rtcore.progressive.Settings`, but for the size."""
         return {"shadows": self.shadows, "fog": self.fog, "reflections": self.reflections, "view": self.view,
-                "adaptive": self.adaptive, "samples": int(self.samples), "seconds": self.seconds, "error": self.error,
+                "adaptive": self.adaptive, "samples": int(self.samples or MOST_SAMPLES), "seconds": self.seconds, "error": self.error,
                 "max_depth": int(self.max_depth), "threads": int(self.threads), "precision": self.precision, "seed": int(self.seed)}

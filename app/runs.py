@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from app.engine import Job
+from app.options import MOST_SAMPLES
 from rtcore.camera import Camera
 from rtcore.scene import Scene
 
@@ -73,6 +74,9 @@ def _words(job: Job) -> dict[str, str]:
     for name, value in _options(job).items():
         if name in LIMITS:
             told[name] = LIMITS[name].format("any" if value is None else f"{value:g}")
+            continue
+        if name == "samples" and value == MOST_SAMPLES:
+            told[name] = "no end of samples"
             continue
         told[name] = WORDS[name][not value] if name in WORDS else f"{value} {NUMBERS[name]}" if name in NUMBERS else str(value)
     return told

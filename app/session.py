@@ -35,6 +35,7 @@ class Session(QObject):
 
     camera_changed = Signal()
     options_changed = Signal()
+    paused_changed = Signal()
     selection_changed = Signal()
     frame_changed = Signal()            # `shown` is another frame, or has another outline
     hover_changed = Signal()
@@ -50,6 +51,7 @@ class Session(QObject):
         self.camera: Camera | None = None       # None until a scene is open
         self.home: Camera | None = None         # the camera the file came with, or the one framed for it
         self.options = Options()
+        self.paused = False
         self.selection: Place | None = None
         self.under: Under | None = None
         self.shown: Shown | None = None
@@ -213,6 +215,18 @@ class Session(QObject):
     def switch(self, name: str, on: bool):
         """Turn shadows, fog or reflections on or off in the picture."""
         self.set_options(msgspec.structs.replace(self.options, **{name: on}))
+
+    def pause(self, on: bool):
+        """Stop refining the picture, or go on with it. What changes meanwhile is shown with a sample per pixel."""
+        if on != self.paused:
+            self.paused = on
+            self.worker.pause(on)
+            self.paused_changed.emit()
+
+    def brighten(self, stops: float):
+        """Show the picture brighter by so many stops, or darker; within what the options allow."""
+        exposure = min(max(self.options.exposure + stops, -10.0), 10.0)
+        self.set_options(msgspec.structs.replace(self.options, exposure=exposure))
 
     def resize(self, size: tuple[int, int], ratio: float):
         """The viewport has this many device pixels, `ratio` of them to a pixel of the desktop's."""

@@ -5,10 +5,13 @@ from PySide6.QtCore import Qt, Slot
 from PySide6.QtWidgets import QLabel, QSizePolicy, QStatusBar, QWidget
 
 from app.forecast import Forecast, left_text
+from app.options import Options
 from app.session import Session
 
 TRACED = ("primary", "shadow", "reflection", "refraction")
-PARTS = (("pass", "converged, samples 65536/65536", "How far it is: the lattice that is traced, then samples per pixel, their mean"),
+PARTS = (("exposure", "+9.99 stops", "How much brighter or darker than it is the picture is shown; one stop doubles the light"),
+         ("pass", "error reached, samples 99999/99999", "How far it is: the lattice that is traced, then samples per pixel, their "
+          "mean; and what it ended by"),
          ("speed", "9,999.9 Mrays/s", "Rays traced in a second, in millions: primary, shadow, reflected and refracted ones"),
          ("elapsed", "99:59:59.9", "How long this picture has been traced"),
          ("error", "error 0.000012", "Estimated root mean square error, in linear light where white is 1; blind to what no sample met"),
@@ -17,13 +20,29 @@ PARTS = (("pass", "converged, samples 65536/65536", "How far it is: the lattice 
          ("distance", "at 1.23456e+10", "How far from the eye that is which the cursor points at, in scene units"))
 
 
-def pass_text(frame, samples: int) -> str:
-    """How far a frame is on the way to so many samples per pixel."""
+def pass_text(frame, options: Options, paused: bool = False) -> str:
+    """How far a frame is on the way to where it is to stop, and what it stopped by."""
     if frame.spacing > 1:
         return f"1/{frame.spacing} lattice"
+    wanted = f"/{options.samples:.0f}" if options.samples is not None and not frame.converged else ""
+    state = ended_by(frame, options) if frame.done else "paused" if paused else ""
+    return f"{state}{state and ', '}samples {frame.mean:.{4 if frame.mean < 1e4 else 7}g}{wanted}"
+
+
+def ended_by(frame, options: Options) -> str:
+    """What ended a picture."""
     if frame.converged:
-        return f"converged, samples {frame.mean:.4g}"
-    return f"{'done, ' if frame.done else ''}samples {frame.mean:.4g}/{samples}"
+        return "converged"
+    if options.error is not None and frame.error is not None and frame.error <= options.error:
+        return "error reached"
+    if options.seconds is not None and frame.elapsed >= options.seconds:
+        return "time is up"
+    return "done"
+
+
+def exposure_text(stops: float) -> str:
+    """Nothing for a picture that is shown as bright as it is."""
+    return f"{stops:+.3g} stop{'' if abs(stops) == 1 else 's'}" if stops else ""
 
 
 def error_text(error: float | None) -> str:
@@ -73,20 +92,24 @@ class Status(QStatusBar):
             self.addPermanentWidget(label)
             self.parts[name] = label
         session.frame_changed.connect(self._frame)
+        session.paused_changed.connect(self._frame)
         session.hover_changed.connect(self._hover)
         session.compiling_changed.connect(self._compiling)
 
     @Slot()
     def _frame(self):
         shown = self._session.shown
-        frame, options = shown.frame, shown.job.options
-        samples = int(options.samples)
+        if shown is None:
+            return
+        frame, options, paused = shown.frame, shown.job.options, self._session.paused
         self._forecast.note(frame.elapsed, frame.mean, frame.error)
-        self.parts["pass"].setText(pass_text(frame, samples))
+        self.parts["exposure"].setText(exposure_text(options.exposure))
+        self.parts["pass"].setText(pass_text(frame, options, paused))
         self.parts["speed"].setText(speed_text(frame))
         self.parts["elapsed"].setText(elapsed_text(frame.elapsed))
         self.parts["error"].setText(error_text(frame.error))
-        self.parts["left"].setText("" if frame.done else left_text(self._forecast.left(samples, options.seconds, options.error)))
+        left = None if frame.done or paused else self._forecast.left(options.samples or math.inf, options.seconds, options.error)
+        self.parts["left"].setText(left_text(left))
 
     @Slot()
     def _hover(self):

@@ -58,6 +58,7 @@ class Window(QMainWindow):
         session.document.changed.connect(self._refresh)
         session.camera_changed.connect(self._refresh)
         session.options_changed.connect(self._refresh)
+        session.paused_changed.connect(self._refresh)
         self.filing.opened.connect(self._remember)
         self.gallery.chosen.connect(self.open)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._scheme_changed)
@@ -246,6 +247,8 @@ class Window(QMainWindow):
         self.actions_by_id["forward"].setEnabled(views.can_forward)
         for which in ("shadows", "fog", "reflections"):
             self.actions_by_id[which].setChecked(getattr(self.session.options, which))
+        self.actions_by_id["pause"].setChecked(self.session.paused)
+        self.actions_by_id["unexposed"].setEnabled(self.session.options.exposure != 0)
 
     # what actions ask for
 

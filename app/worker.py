@@ -43,7 +43,9 @@ class Worker(QObject):
         self._wake = threading.Condition()
         self._next: Job | None = None
         self._running: Job | None = None
-        self._closing = False
+        self._halted: Job | None = None         # stopped by a pause, to be gone on with
+        self._paused = self._closing = False
+        self._latest: Shown | None = None       # the last frame, whether taken or not; the render thread's own
         self._newest: Shown | None = None
         self._announced = False
         self._spares: list[np.ndarray] = [np.empty((0, 0, 4), np.uint8)] * 3
@@ -61,6 +63,12 @@ class Worker(QObject):
             self._wake.notify()
         if self.compiling is not None and running is not None and running.document != job.document:
             self._compiler.kill()
+
+    def pause(self, on: bool):
+        """Stop refining as soon as every pixel has a sample, and stay so with later jobs; or go on where it was stopped."""
+        with self._wake:
+            self._paused = on
+            self._wake.notify()
 
     def take(self) -> Shown | None:
         """The newest frame, if one came since the last call. It is the caller's until the next call that returns one."""
@@ -106,30 +114,36 @@ class Worker(QObject):
     def _await_job(self) -> Job | None:
         with self._wake:
             self._running = None
-            self._wake.wait_for(lambda: self._next is not None or self._closing)
-            self._running, self._next = self._next, None
+            self._wake.wait_for(lambda: self._next is not None or self._closing or (self._halted is not None and not self._paused))
+            self._running, self._next, self._halted = self._next or self._halted, None, None
             return None if self._closing else self._running
 
     def _render(self, engine: Engine, job: Job):
+        latest = self._latest
+        if latest is not None and latest.frame.done and job.looks_like(latest.job) and job.options != latest.job.options:
+            return self._show(engine, latest.frame, job)     # only the exposure is another
         request = engine.request(job)
         if names := engine.missing(job):
             self._compile(names)
             with self._wake:
                 if self._next is not None or self._closing:
                     return      # somebody moved on while the helper worked
-        started, shown = time.monotonic(), 0
+        started, shown, whole = time.monotonic(), 0, False
 
         def cancelled() -> bool:
             newer = self._next
             if newer is None or self._closing:
-                return self._closing
+                return self._closing or (self._paused and whole)
             return shown > 0 or not newer.continues or time.monotonic() - started > PATIENCE
 
         for frame in engine.frames(request, cancelled):
             self._show(engine, frame, job)
-            shown += 1
+            shown, whole = shown + 1, frame.samples > 0
             if cancelled():
                 break
+        if whole and not frame.done:
+            with self._wake:
+                self._halted = job
 
     def _compile(self, names: list[str]):
         def progress(state: Compiling | None):
@@ -150,8 +164,8 @@ class Worker(QObject):
             span, width = self._span, self._width
         if spare.shape[:2] != frame.pixels.shape[:2]:
             spare = np.empty((*frame.pixels.shape[:2], 4), np.uint8)
-        engine.encode(frame.pixels, spare)
-        shown = Shown(spare, frame, job, trace_outline(frame.node, span, width) if span else None)
+        engine.encode(frame.pixels, spare, job.options.gain())
+        self._latest = shown = Shown(spare, frame, job, trace_outline(frame.node, span, width) if span else None)
         with self._wake:
             if self._newest is not None:
                 self._spares.append(self._newest.bytes)

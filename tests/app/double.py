@@ -65,9 +65,9 @@ class Double:
                         time.monotonic() - started + 1e-6, last, plan(job.scene, Settings(size=job.size, **job.options.settings())),
                         {("primary rays", "core"): 0.25, ("hits: sphere", "sphere"): 0.75}, {"shapes": 1024})
 
-    def encode(self, pixels: np.ndarray, out: np.ndarray):
+    def encode(self, pixels: np.ndarray, out: np.ndarray, gain: float):
         out[..., 3] = 255
-        out[..., 2::-1] = (np.clip(pixels, 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
+        out[..., 2::-1] = (np.clip(pixels * gain, 0, 1) ** (1 / 2.2) * 255).astype(np.uint8)
 
     def close(self):
         self.closed = True

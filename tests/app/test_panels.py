@@ -190,11 +190,14 @@ def test_properties_of_what_is_not_a_node(window, session, qtbot, place):
 
 
 def test_render_panel(window, session, qtbot):
-    form = window.panels["Render"].form
-    type_into(qtbot, form.editors["samples"].entries[0], "7")
+    samples = window.panels["Render"].editors["samples"].findChild(QLineEdit)
+    type_into(qtbot, samples, "7")
     assert session.options.samples == 7 and not session.document.modified
-    type_into(qtbot, form.editors["samples"].entries[0], "7.5")
-    assert session.options.samples == 7 and form.editors["samples"].entries[0].property("refused")
+    for refused in ("7.5", "0", "1048577"):
+        type_into(qtbot, samples, refused)
+        assert session.options.samples == 7 and samples.property("refused")
+    type_into(qtbot, samples, "1048576")
+    assert session.options.samples == 1 << 20
 
 
 def test_an_edit_leaves_the_tree_open(window, session):
@@ -208,17 +211,28 @@ def test_an_edit_leaves_the_tree_open(window, session):
 
 
 def test_when_to_stop_is_asked_of_the_renderer(window, session, double, qtbot, settled):
-    form = window.panels["Render"].form
+    panel = window.panels["Render"]
     for name, text in (("seconds", "3.5"), ("error", "0.01")):
-        editor = form.editors[name]
+        editor = panel.editors[name]
         assert getattr(session.options, name) is None and not editor.box.isChecked()
         qtbot.mouseClick(editor.box, Qt.MouseButton.LeftButton)
         assert getattr(session.options, name) == {"seconds": 10.0, "error": 0.002}[name]
         type_into(qtbot, editor.findChild(QLineEdit), text)
         assert getattr(session.options, name) == float(text)
-    type_into(qtbot, form.editors["error"].findChild(QLineEdit), "0", end=None)
+    type_into(qtbot, panel.editors["error"].findChild(QLineEdit), "0", end=None)
     assert session.options.error == 0.01
     settled(session)
     assert double.jobs[-1].options.settings()["seconds"] == 3.5
-    qtbot.mouseClick(form.editors["seconds"].box, Qt.MouseButton.LeftButton)
+    qtbot.mouseClick(panel.editors["seconds"].box, Qt.MouseButton.LeftButton)
     assert session.options.seconds is None
+    assert panel.ends.text().startswith("Whichever comes first, or when no error")
+    qtbot.mouseClick(panel.editors["error"].box, Qt.MouseButton.LeftButton)
+    assert panel.ends.text().startswith("Stops before that if no error")
+    qtbot.mouseClick(panel.editors["samples"].box, Qt.MouseButton.LeftButton)
+    assert session.options.samples is None and panel.ends.text() == "Goes on until no error is left that could be seen."
+    panel.editors["adaptive"].box.click()
+    assert panel.ends.text() == "Never stops."
+    settled(session)
+    assert double.jobs[-1].options.settings()["samples"] == 1 << 20
+    qtbot.mouseClick(panel.editors["samples"].box, Qt.MouseButton.LeftButton)
+    assert session.options.samples == 16 and panel.ends.isHidden()

@@ -7,6 +7,7 @@ import rtcore
 from app.filing import Filing
 from app.places import Place, node_at
 from rtcore.camera import Camera
+from rtcore.files.image import srgb_bytes
 
 
 @pytest.fixture
@@ -213,6 +214,39 @@ def test_the_picture_is_saved(session, filing, tmp_path, qtbot, settled, said):
     assert said[-1][0] == "info"
     with Image.open(tmp_path / "picture.png") as picture:
         assert picture.size == (160, 120)
+
+
+def test_a_png_is_as_bright_as_shown_and_an_exr_as_it_is(session, filing, tmp_path, qtbot, settled, said):
+    from PIL import Image
+    OpenEXR = pytest.importorskip("OpenEXR")
+    session.brighten(-2.0)
+    settled(session)
+    for name in ("dark.png", "light.exr"):
+        said.clear()
+        filing.save_picture(tmp_path / name)
+        qtbot.waitUntil(lambda: bool(said), timeout=5000)
+    assert "as it is" in said[-1][1]
+    light = session.shown.frame.pixels
+    with Image.open(tmp_path / "dark.png") as picture:
+        assert picture.text["Exposure"] == "-2 stops"
+        assert np.abs(np.asarray(picture) / 255 - srgb_bytes(light / 4) / 255).max() < 0.01
+    with OpenEXR.File(str(tmp_path / "light.exr")) as file:
+        assert np.allclose(file.channels()["RGB"].pixels, light)
+
+
+def test_brightness_ends_at_ten_stops_and_leaves_false_colours_alone(session, settled):
+    for _ in range(25):
+        session.brighten(0.5)
+    assert session.options.exposure == 10 and session.options.gain() == 1024
+    assert msgspec.structs.replace(session.options, view="normal").gain() == 1
+
+
+def test_a_pause_is_told_once(session, qtbot):
+    told = []
+    session.paused_changed.connect(lambda: told.append(session.paused))
+    for on in (True, True, False):
+        session.pause(on)
+    assert told == [True, False]
 
 
 def test_a_picture_for_a_forbidden_place_is_refused(session, filing, tmp_path, qtbot, settled, said):

@@ -1,4 +1,6 @@
 """The status bar's texts, and how long a picture will take yet."""
+import math
+
 import pytest
 
 from app.forecast import Forecast, left_text
@@ -34,8 +36,31 @@ def test_texts():
 def test_only_a_converged_picture_is_called_so(session, settled):
     settled(session)
     frame = session.shown.frame._replace(spacing=1, mean=8.0)
-    assert pass_text(frame._replace(done=True, converged=True), 16).startswith("converged")
-    assert not pass_text(frame._replace(done=True), 8).startswith("converged") and pass_text(frame._replace(spacing=4), 8) == "1/4 lattice"
+    assert pass_text(frame._replace(done=True, converged=True), Options()) == "converged, samples 8"
+    assert pass_text(frame._replace(done=True), Options(samples=8)) == "done, samples 8/8"
+    assert pass_text(frame._replace(spacing=4), Options()) == "1/4 lattice"
+
+
+def test_it_tells_what_ended_a_picture(session, settled):
+    settled(session)
+    frame = session.shown.frame._replace(spacing=1, mean=8.0, elapsed=3.0, error=0.004)
+    for options, done, paused, text in (
+            (Options(error=0.004), True, False, "error reached, samples 8/16"),
+            (Options(seconds=3.0), True, False, "time is up, samples 8/16"),
+            (Options(samples=None, seconds=2.0, error=0.003), True, False, "time is up, samples 8"),
+            (Options(samples=8, seconds=9.0, error=0.003), True, True, "done, samples 8/8"),
+            (Options(samples=None), False, False, "samples 8"), (Options(samples=None), False, True, "paused, samples 8")):
+        assert pass_text(frame._replace(done=done), options, paused) == text
+    assert pass_text(frame._replace(mean=123456.0, done=False), Options(samples=1 << 20)) == "samples 123456/1048576"
+
+
+def test_the_exposure_is_told_where_it_is_not_as_it_is(window, session, settled, qtbot):
+    label = window.statusBar().parts["exposure"]
+    assert label.text() == ""
+    for stops, text in ((1.0, "+1 stop"), (-0.5, "-0.5 stops"), (-9.87, "-9.87 stops"), (10.0, "+10 stops"), (0.0, "")):
+        session.set_options(Options(exposure=stops))
+        settled(session)
+        assert label.text() == text and label.fontMetrics().horizontalAdvance(text) <= label.width()
 
 
 def test_the_forecast_is_an_interval_of_paces():
@@ -45,6 +70,7 @@ def test_the_forecast_is_an_interval_of_paces():
         forecast.note(seconds, samples)
     assert forecast.left(16) == pytest.approx((1.5, 6.0)) and forecast.left(5) == (0, 0)
     assert forecast.left(16, seconds=7.0) == pytest.approx((1.5, 3.0)) and forecast.left(16, seconds=1.0) == (0, 0)
+    assert forecast.left(math.inf) is None and forecast.left(math.inf, seconds=7.0) == pytest.approx((3.0, 3.0))
     assert forecast.left(16, error=0.1) == pytest.approx((1.5, 6.0))       # nothing is known of the error yet
     forecast.note(5.0, 11.0, 0.2)
     assert forecast.left(1000, error=0.1) == pytest.approx((5.0, 15.0)) and forecast.left(1000, error=0.3) == (0, 0)

@@ -89,6 +89,44 @@ def test_the_signal_is_coalesced_and_the_painted_buffer_left_alone(start, qtbot,
     assert len(buffers) <= 3
 
 
+def test_a_pause_lets_every_pixel_have_a_sample_and_resuming_goes_on(start, qtbot, scene):
+    double = Double(pause=0.02, spacings=(4, 1, 1, 1, 1, 1))
+    worker, frames = start(double), []
+    worker.newest.connect(lambda: frames.append(worker.take().frame))
+    worker.pause(True)
+    worker.submit(job(scene))
+    qtbot.waitUntil(lambda: bool(frames) and frames[-1].samples == 1)
+    qtbot.wait(150)
+    assert len(frames) <= 2 and not frames[-1].done     # a frame that nobody took in time is replaced by the next
+    worker.pause(False)
+    qtbot.waitUntil(lambda: frames[-1].done)
+    assert len(double.jobs) == 2 and double.jobs[0] is double.jobs[1]
+    worker.pause(True)
+    worker.submit(job(scene, 2))        # a change while paused: its first sample, no more
+    qtbot.waitUntil(lambda: frames[-1].samples == 1 and not frames[-1].done)
+    qtbot.wait(100)
+    assert not frames[-1].done and len(double.jobs) == 3
+
+
+def test_a_change_of_exposure_traces_nothing(start, qtbot, scene):
+    double = Double()
+    worker, shown = start(double), []
+    worker.newest.connect(lambda: shown.append(worker.take()))
+    worker.submit(job(scene))
+    qtbot.waitUntil(lambda: bool(shown) and shown[-1].frame.done)
+    first, plain = shown[-1], shown[-1].bytes.copy()
+    worker.submit(job(scene, 2)._replace(options=Options(exposure=-1.0)))
+    qtbot.waitUntil(lambda: shown[-1].job.number == 2)
+    assert shown[-1].frame is first.frame and len(double.jobs) == 1
+    assert (shown[-1].bytes[..., :3] < plain[..., :3]).mean() > 0.9
+    worker.submit(job(scene, 3)._replace(options=Options(exposure=-1.0)))     # the very same once more is meant: run again
+    qtbot.waitUntil(lambda: shown[-1].job.number == 3 and shown[-1].frame.done)
+    assert len(double.jobs) == 2
+    worker.submit(job(scene, 4)._replace(options=Options(exposure=1.0, shadows=False)))
+    qtbot.waitUntil(lambda: shown[-1].job.number == 4 and shown[-1].frame.done)
+    assert len(double.jobs) == 3
+
+
 def test_a_failure_is_told_and_the_thread_lives_on(start, qtbot, scene, capsys):
     double = Double()
     double.fail = ValueError("no such thing")
