@@ -12,7 +12,7 @@ import numpy as np
 
 from rtcore.jit import kernel
 from rtcore.sampling import REPLICATES
-from rtcore.wave import NX, T
+from rtcore.wave import DEPTH_UNIT, NX, T
 
 
 class Film(NamedTuple):
@@ -26,15 +26,17 @@ class Film(NamedTuple):
     distance: np.ndarray    # float32 (h·w): how far away, inf none
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
     doubt: np.ndarray       # uint8 (h·w): not 0 where that hit, or that there is none nearer, has no proof
+    lit: np.ndarray         # float32 (h·w): which share of the lights reaches it; length 0 if not wanted
 
 
-def new_film(width: int, height: int, samples: int = 2) -> Film:
-    """An empty film for so many samples per pixel."""
+def new_film(width: int, height: int, samples: int = 2, lit: bool = False) -> Film:
+    """An empty film for so many samples per pixel. lit: whether it is to note which lights reach what is hit first."""
     n = width * height
     m = n if samples > 1 else 0
     # full and not zeros: the system hands the memory out now, not page by page in the midst of tracing, a tenth of whose time that took
     return Film(np.full((n, 3), 0.0), np.full((m, 3), np.float32(0)), np.full(m, 0.0), np.full(n, np.int32(0)), np.full(n, np.int32(-1)),
-                np.full(n, np.float32(np.inf)), np.full((n, 3), np.float32(0)), np.full(n, np.uint8(0)))
+                np.full(n, np.float32(np.inf)), np.full((n, 3), np.float32(0)), np.full(n, np.uint8(0)),
+                np.full(n if lit else 0, np.float32(0)))
 
 
 @kernel
@@ -55,6 +57,14 @@ def note_doubt(film, wave, n, target, first, last):
     for i in range(n):
         hit = first <= wave.rays.prim[i] < last
         film.doubt[target[i]] = wave.rays.doubt[i] if hit else wave.rays.doubt[i] & 2
+
+
+@kernel
+def note_lit(film, beam, n, target, share):
+    """Add to the pixels `target` of a first wave its share for each of the beam's n rays that reached its light, or what came through."""
+    for j in range(n):
+        if beam.rays.prim[j] < 0:
+            film.lit[target[beam.owner[j]]] += share * np.float32(np.exp(-beam.rays.depth[j] * DEPTH_UNIT))
 
 
 @kernel

@@ -91,7 +91,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds},
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
-              "adaptive": "further samples" in stages and (settings.adaptive or VIEW[settings.view].needs_error)}
+              "adaptive": "further samples" in stages and (settings.adaptive or "adaptive" in VIEW[settings.view].kernels),
+              "recast": "recast" in VIEW[settings.view].kernels}
     names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)

@@ -26,6 +26,7 @@ from rtcore import adaptive, film as films
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, Geometry, flatten, nbytes
 from rtcore.plan import VIEW, Plan, plan
+from rtcore.recast import Recast
 from rtcore.scene import Scene
 from rtcore.schedule import COARSEST, Pass, passes, tile_order, tiles, weight
 from rtcore.settings import Settings
@@ -77,7 +78,9 @@ class Render:
         view = camera.rays(width, height)
         lens = camera.lens() if self.plan.lens else None
         self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
-        self.film = films.new_film(width, height, self.plan.samples)
+        # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
+        self.film = films.new_film(width, height, self.plan.samples, lit=coarse or VIEW[self.settings.view].needs_lit)
+        self.recast = Recast(geometry, view, width, height)
         self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
         self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
         self.schedule = passes(adaptive.FIRST if self.adaptive else self.plan.samples, coarse)
@@ -102,6 +105,8 @@ class Render:
             return False
         if VIEW[settings.view].needs_light and not VIEW[mine.view].needs_light:
             return False        # no light was traced
+        if VIEW[settings.view].needs_lit and not len(self.film.lit):
+            return False
         return not self.done or settings.view != self.settings.view
 
     def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[None]:
@@ -206,9 +211,12 @@ class Render:
         node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
         films.develop(self.film, width, height, COARSEST, pixels)
         films.fill(self.film, self.tracer.geometry.leaf, width, height, COARSEST, node, distance, normal, doubt)
-        view = VIEW[self.settings.view]
-        error = np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width) if view.needs_error else None
-        shown = view.draw(Seen(pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width), error))
+        shown = VIEW[self.settings.view].draw(Seen(
+            pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width),
+            error=lambda: np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width),
+            lit=lambda: self.recast.spread(self.film, self.film.lit, COARSEST),
+            coordinates=lambda: self.recast.spread(self.film, self.recast.coordinates(self.film), COARSEST),
+            tests=lambda: self.recast.spread(self.film, self.recast.tests(self.film), COARSEST)))
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),
                      self.converged, self.held())

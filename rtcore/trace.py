@@ -146,24 +146,28 @@ class Tracer:
         counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
         if first:
             films.note_first_hits(film, wave, n, scratch.target)
+            if len(film.lit):       # what a tile that was given up has noted does not count
+                film.lit[scratch.target[:n]] = 0
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
             clock.lap("film", "core")
-        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale):
+        noting = film if first and len(film.lit) else None
+        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, noting):
             return False
         counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
         clock.lap("film", "core")
         scratch.counts += counts
         return True
 
-    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale) -> bool:
-        """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
+    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale, noting: films.Film | None) -> bool:
+        """Light a wave that has hit, and all that comes of it, level by level; False if stale. noting: the film, if it is to note which
+        lights reach the first hits."""
         clock = scratch.clock
         for depth in range(1, self.settings.max_depth + 1):
             if depth > 1:
                 self.hit(clock, wave, n)
-            self._light(scratch, wave, n, depth, counts)
+            self._light(scratch, wave, n, depth, counts, noting if depth == 1 else None)
             if self.fog is not None:
                 fogs.dim(wave, n, self.fog)
                 clock.lap("fog", "fog")
@@ -189,7 +193,7 @@ class Tracer:
             group.kind.surface(wave.rays, n, wave.surface, group.table, group.first)
             clock.lap("surface at the hits", group.kind.name)
 
-    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray) -> None:
+    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, noting: films.Film | None) -> None:
         clock = scratch.clock
         if not self.lamps:
             shading.glow(wave, n, self.look, NO_ANSWER)
@@ -213,5 +217,7 @@ class Tracer:
                     group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
                     clock.lap("shadow rays", group.kind.name)
                 counts[SHADOW] += m
+            if noting is not None:
+                films.note_lit(noting, beam, m, scratch.target, np.float32(1 / len(self.lamps)))
             counts[SHADOW_HITS] += shading.gather(wave, beam, m)
             clock.lap(f"light: {lamps[0].name}", "lit")

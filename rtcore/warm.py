@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, rows, shading
+from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, recast, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.lights import SAMPLED, SHINE, Draw
@@ -72,6 +72,13 @@ def _adaptive(dtype):
     adaptive.squared_errors(films.new_film(8, 8), 8, 8)
 
 
+def _recast(dtype):
+    film, pixels = films.new_film(8, 8), np.zeros(0, np.int32)
+    recast.sources(film, 8, 8, 1, np.empty(64, np.int32))
+    recast.cast_again(new_rays(8, dtype), 0, Camera().rays(8, 8), 8, pixels, film)
+    recast.count_tests(bvh.EMPTY_TREE, 0, Camera().rays(8, 8), 8, pixels, film.distance, pixels)
+
+
 def _leaf(dtype):
     bvh.build(np.zeros((1, 3)), np.ones((1, 3)), 2)
 
@@ -89,7 +96,9 @@ def _rows(dtype):
 
 def _lit(dtype):
     wave, _, n = _wave(dtype)
-    shading.gather(wave, new_beam(n, 1, dtype), 0)
+    beam = new_beam(n, 1, dtype)
+    shading.gather(wave, beam, 0)
+    films.note_lit(films.new_film(8, 8, lit=True), beam, 0, np.empty(0, np.int32), np.float32(1))
 
 
 def _fog(dtype):
@@ -126,7 +135,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
-    "adaptive": ("rtcore.adaptive", _adaptive),
+    "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
 }

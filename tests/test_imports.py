@@ -25,7 +25,7 @@ LAYERS = (
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.lens", "rtcore.shading", "rtcore.fog", "rtcore.film",
      "rtcore.schedule", "rtcore.adaptive"},
     {"rtcore.files", "rtcore.flatten", "rtcore.plan"},
-    {"rtcore.algebra", "rtcore.trace"},
+    {"rtcore.algebra", "rtcore.recast", "rtcore.trace"},
     {"rtcore.progressive", "rtcore.warm"},
     {"rtcore.account"},
     {"rtcore.api"},

@@ -7,8 +7,9 @@ LEAST, MOST = 2.0 ** -14, 0.1
 
 
 def draw(seen):
-    share = np.log(np.maximum(seen.error, LEAST) / LEAST) / np.log(MOST / LEAST)
-    return heat(np.where(np.isfinite(seen.error), share, 0))
+    error = seen.error()
+    share = np.log(np.maximum(error, LEAST) / LEAST) / np.log(MOST / LEAST)
+    return heat(np.where(np.isfinite(error), share, 0))
 
 
-ERROR = View("error", "the estimated error of each pixel, on a logarithmic scale", draw, needs_light=True, needs_error=True)
+ERROR = View("error", "the estimated error of each pixel, on a logarithmic scale", draw, needs_light=True, kernels=("adaptive",))

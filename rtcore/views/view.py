@@ -17,19 +17,25 @@ class Seen(NamedTuple):
     normal: np.ndarray          # float32 (h, w, 3): its normal, 0 none
     doubt: np.ndarray           # uint8 (h, w): 1 where that hit lacks a proof
     count: np.ndarray           # int32 (h, w): samples so far
-    error: np.ndarray | None    # float32 (h, w): estimated error, inf where unknown; only for a view that needs it
+    # worked out only for a view that asks; arrays of its own
+    error: Callable[[], np.ndarray]         # float32 (h, w): estimated error, inf where unknown
+    lit: Callable[[], np.ndarray]           # float32 (h, w): share of the lights that reach that hit
+    coordinates: Callable[[], np.ndarray]   # float32 (h, w, 3): on a triangle the weights of its corners, else u, v, 0; 0 none
+    tests: Callable[[], np.ndarray]         # int32 (h, w): boxes and primitives that the eye's ray must be tested against
 
 
 @dataclass(frozen=True)
 class View:
     """A name, a line of help, and `draw`, which makes a linear picture (h, w, 3) float32. One that needs no light is drawn from the
-    first hits alone, if nothing else was asked for."""
+    first hits alone, if nothing else was asked for. needs_lit: the film must
+    have noted which lights reach the first hits. kernels: the groups (`rtcore.warm`) that drawing it takes."""
 
     name: str
     help: str
     draw: Callable[[Seen], np.ndarray]
     needs_light: bool = False
-    needs_error: bool = False
+    needs_lit: bool = False
+    kernels: tuple[str, ...] = ()
 
 
 def palette(n: int) -> np.ndarray:
