@@ -41,6 +41,8 @@ ACTIONS = (
            lambda w, on: w.session.switch("reflections", on), True),
     Action("pause", "&Pause", "pause", "P", "Stop refining the picture, and go on from there; what changes meanwhile is shown with one "
            "sample per pixel", lambda w, on: w.session.pause(on), True),
+    Action("region", "&Region of interest", "region", "R", "Draw a rectangle in the picture that is refined first; press again to drop it",
+           lambda w, on: w.viewport.ask_region(on), True),
     Action("brighter", "&Brighter", "", ".", "Show the picture half a stop brighter", lambda w: w.session.brighten(0.5)),
     Action("darker", "&Darker", "", ",", "Show the picture half a stop darker", lambda w: w.session.brighten(-0.5)),
     Action("unexposed", "As &bright as it is", "", "0", "Show the light as it is, white at 1",
@@ -59,12 +61,13 @@ MENUS = (
     ("&File", ("open", "<recent>", "gallery", "reload", None, "save", "save_as", "save_picture", None, "quit")),
     ("&Edit", ("undo", "redo")),
     ("&View", ("back", "forward", None, "frame_selection", "frame_all", "reset_view", None, "shadows", "fog", "reflections", None,
-               "pause", "brighter", "darker", "unexposed", None, "<panels>", "<theme>", "panels", "fullscreen", "arrange")),
+               "pause", "region", "brighter", "darker", "unexposed", None, "<panels>", "<theme>", "panels", "fullscreen", "arrange")),
     ("&Help", ("shortcuts", "about")),
 )
 
 TOOLBAR = ("open", "gallery", "save", "save_picture", "reload", None, "undo", "redo", None, "back", "forward", "frame_selection",
-           "frame_all", "reset_view", None, "shadows", "fog", "reflections", None, "pause", "<space>", "panels", "fullscreen", "shortcuts")
+           "frame_all", "reset_view", None, "shadows", "fog", "reflections", None, "pause", "region", "<space>", "panels",
+           "fullscreen", "shortcuts")
 
 #: Shown with their names in the toolbar, because a symbol alone would not tell.
 WORDED = ("gallery", "shadows", "fog", "reflections")
@@ -72,5 +75,6 @@ WORDED = ("gallery", "shadows", "fog", "reflections")
 #: What the mouse and the fly keys do in the picture, for the shortcuts' dialog.
 MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"),
          ("Wheel, right drag", "nearer or farther; the wheel toward the cursor"), ("Click", "select what is seen there"),
-         ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "select nothing; leave the full screen"),
+         ("Ctrl + drag", "draw a region that is refined first"),
+         ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "drop the region; select nothing; leave the full screen"),
          ("Up, Down in a number", "step it; Page Up and Page Down by ten"))

@@ -1,4 +1,5 @@
 """The one door from the window to the compiled half of rtcore. Made and used on the render thread only."""
+import math
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,9 +25,17 @@ class Job(NamedTuple):
     document: int = 0           # counts opened files: kernels are compiled anew only for another one
 
     def looks_like(self, other: "Job") -> bool:
-        """Whether both have the same picture, at most shown brighter or darker; scenes are told apart by identity, as everywhere."""
+        """Whether both come to the same picture, at most shown otherwise; scenes are told apart by identity, as everywhere."""
         return (self.scene is other.scene and (self.camera, self.size) == (other.camera, other.size)
                 and self.options.looks_like(other.options))
+
+    def region(self) -> tuple[int, int, int, int] | None:
+        """Pixels (x0, y0, x1, y1), half open, that are refined first: all that the options' rectangle touches."""
+        if self.options.region is None:
+            return None
+        width, height = self.size
+        left, top, right, bottom = self.options.region
+        return math.floor(left * width), math.floor(top * height), math.ceil(right * width), math.ceil(bottom * height)
 
 
 class Engine:

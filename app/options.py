@@ -3,7 +3,7 @@ from typing import Annotated
 
 import msgspec
 
-from rtcore.fields import Choice, FieldError, Flag, Maybe, Number, Record
+from rtcore.fields import Choice, FieldError, Flag, Maybe, Number, Numbers, Record
 from rtcore.settings import VIEW_NAMES
 
 MOST_SAMPLES = 1 << 20      # what the renderer is asked for where no end is set
@@ -18,6 +18,8 @@ class Options(Record, frozen=True, kw_only=True):
     view: Annotated[str, Choice(words=VIEW_NAMES, help="what is shown of the picture; a switch traces nothing")] = "beauty"
     exposure: Annotated[float, Number(least=-10, most=10, help="how bright it is shown; one stop doubles it. PNG files are as shown, EXR "
                                       "files keep the light as it is", unit="stops")] = 0.0
+    region: Annotated[tuple[float, float, float, float] | None, Maybe(inner=Numbers(count=4), help="what is refined first: left, top, "
+                      "right and bottom in 0 to 1 of the picture")] = None
     adaptive: Annotated[bool, Flag(help="put the samples where the error is: the number of samples is then their mean")] = True
     samples: Annotated[int | None, Maybe(inner=Number(least=1, most=MOST_SAMPLES), help="stop after so many rays through each pixel")] = 16
     seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after so many seconds of tracing")] = None
@@ -33,14 +35,18 @@ class Options(Record, frozen=True, kw_only=True):
             value = getattr(self, name)
             if value is not None and value != int(value):
                 raise FieldError("a whole number", value, name)
+        if self.region is not None:
+            left, top, right, bottom = self.region
+            if not (0 <= left < right <= 1 and 0 <= top < bottom <= 1):
+                raise FieldError("a rectangle within 0 to 1", self.region, "region")
 
     def gain(self) -> float:
         """What the light is multiplied by to be shown. False colours are no light and stay as they are."""
         return 2.0 ** self.exposure if self.view == "beauty" else 1.0
 
     def looks_like(self, other: "Options") -> bool:
-        """Whether both have the same picture, at most shown brighter or darker."""
-        return msgspec.structs.replace(self, exposure=other.exposure) == other
+        """Whether both come to the same picture, at most shown brighter or darker, or traced in another order."""
+        return msgspec.structs.replace(self, exposure=other.exposure, region=other.region) == other
 
     def settings(self) -> dict:
         """The keyword arguments of `rtcore.progressive.Settings`, but for the size."""

@@ -228,6 +228,10 @@ class Session(QObject):
         exposure = min(max(self.options.exposure + stops, -10.0), 10.0)
         self.set_options(msgspec.structs.replace(self.options, exposure=exposure))
 
+    def choose_region(self, region: tuple[float, float, float, float] | None):
+        """Refine this part of the picture first: left, top, right and bottom in 0 .. 1 of it; None: all alike."""
+        self.set_options(msgspec.structs.replace(self.options, region=region))
+
     def resize(self, size: tuple[int, int], ratio: float):
         """The viewport has this many device pixels, `ratio` of them to a pixel of the desktop's."""
         if (size, ratio) != (self._size, self._ratio):

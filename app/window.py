@@ -59,6 +59,7 @@ class Window(QMainWindow):
         session.camera_changed.connect(self._refresh)
         session.options_changed.connect(self._refresh)
         session.paused_changed.connect(self._refresh)
+        self.viewport.asking_changed.connect(self._refresh)
         self.filing.opened.connect(self._remember)
         self.gallery.chosen.connect(self.open)
         QGuiApplication.styleHints().colorSchemeChanged.connect(self._scheme_changed)
@@ -247,6 +248,7 @@ class Window(QMainWindow):
         self.actions_by_id["forward"].setEnabled(views.can_forward)
         for which in ("shadows", "fog", "reflections"):
             self.actions_by_id[which].setChecked(getattr(self.session.options, which))
+        self.actions_by_id["region"].setChecked(self.viewport.asking or self.session.options.region is not None)
         self.actions_by_id["pause"].setChecked(self.session.paused)
         self.actions_by_id["unexposed"].setEnabled(self.session.options.exposure != 0)
 

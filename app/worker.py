@@ -121,7 +121,7 @@ class Worker(QObject):
     def _render(self, engine: Engine, job: Job):
         latest = self._latest
         if latest is not None and latest.frame.done and job.looks_like(latest.job) and job.options != latest.job.options:
-            return self._show(engine, latest.frame, job)     # only the exposure is another
+            return self._show(engine, latest.frame, job)     # the light is the same
         request = engine.request(job)
         if names := engine.missing(job):
             self._compile(names)

@@ -10,8 +10,11 @@ from PySide6.QtWidgets import (QApplication, QCheckBox, QComboBox, QDockWidget, 
 
 import rtcore
 from app import dialogs
+from app.engine import Job
 from app.gallery import GALLERY
+from app.options import Options
 from app.places import Place
+from rtcore.fields import FieldError
 
 
 def test_the_mouse_in_the_picture_orbits_pans_and_dollies(window, session, qtbot, settled):
@@ -148,3 +151,53 @@ def test_dialogs_suggest_a_new_file_where_it_belongs(window, session, tmp_path, 
     window.save_as()
     window.save_picture()
     assert suggested == [str(tmp_path / as_scene), str(tmp_path / as_picture)]
+
+
+def test_a_region_is_drawn_and_dropped(window, session, double, qtbot, settled):
+    qtbot.waitUntil(lambda: session.shown.job.size == (window.viewport.width(), window.viewport.height()) and session.shown.frame.done)
+    view, action, camera = window.viewport, window.actions_by_id["region"], session.camera
+    width, height = view.width(), view.height()
+
+    def drag(keys=Qt.KeyboardModifier.NoModifier):
+        start, end = QPoint(width * 3 // 4, height // 4), QPoint(width // 4, height * 2)      # from the right, and out of the picture
+        qtbot.mousePress(view, Qt.MouseButton.LeftButton, keys, start)
+        send_move(view, start - QPoint(20, 0), Qt.MouseButton.LeftButton, keys)
+        send_move(view, end, Qt.MouseButton.LeftButton, keys)
+        qtbot.mouseRelease(view, Qt.MouseButton.LeftButton, keys, end)
+
+    def row() -> list[int]:
+        return [view.grab().toImage().pixel(x, height // 2) for x in range(width // 4 - 9, width // 4 + 9)]
+
+    asked, bare = len(double.jobs), row()
+    action.trigger()
+    assert view.asking and action.isChecked() and view.cursor().shape() == Qt.CursorShape.CrossCursor
+    drag()
+    assert session.options.region == pytest.approx((0.25, 0.25, 0.75, 1.0), abs=0.01) and session.camera == camera
+    assert not view.asking and action.isChecked() and view.cursor().shape() == Qt.CursorShape.ArrowCursor
+    settled(session)
+    assert len(double.jobs) == asked        # the finished picture is none the finer for it
+    assert 2 <= sum(a != b for a, b in zip(bare, row())) <= 5       # a thin line
+    action.trigger()
+    assert session.options.region is None and not action.isChecked() and row() == bare
+    drag(Qt.KeyboardModifier.ControlModifier)
+    assert session.options.region is not None and session.camera == camera
+    qtbot.keyClick(view, Qt.Key.Key_Escape)
+    assert session.options.region is None
+    action.trigger()
+    qtbot.mouseClick(view, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, view.rect().center())
+    assert not view.asking and session.selection is None
+    drag()
+    assert session.camera != camera
+
+
+@pytest.mark.parametrize(("region", "pixels"), [((0, 0, 1, 1), (0, 0, 160, 120)), ((0.501, 0.25, 0.502, 0.3), (80, 30, 81, 36)),
+                                                (None, None)])
+def test_a_region_in_pixels_is_all_that_it_touches(session, region, pixels):
+    job = Job(1, session.scene, session.camera, Options(region=region), (160, 120))
+    assert job.region() == pixels
+
+
+@pytest.mark.parametrize("region", [(0, 0, 1, 1.01), (0.5, 0, 0.5, 1), (0, 0.6, 1, 0.4), (0, 0, 1)])
+def test_a_region_is_a_rectangle_within_the_picture(region):
+    with pytest.raises(FieldError):
+        Options(region=region)
