@@ -1,21 +1,47 @@
 """Primary rays: a tile of the picture, of a coarse lattice over it, or a list of pixels, as a wave."""
 import numpy as np
 
-from rtcore.jit import inline, kernel
+from rtcore.jit import inline, inline_new, kernel
+from rtcore.lanes import LANES, fill, load, rounded, splat, store, vec3, zero
+from rtcore.neighbours import count_up
 from rtcore.sampling import jitter
-from rtcore.shapes.kind import normalized
-from rtcore.wave import finish, put_ray
+from rtcore.shapes._surface import normalized
+from rtcore.wave import DX, OX, START, T, finish
+
+
+@inline_new
+def _new_places():
+    """Room for where eight rays go through the picture, (2, 8), in pixels from the top left."""
+    return np.zeros((2, LANES))
 
 
 @inline
-def _put(wave, n, target, view, pixel, u, v):
-    """Primary ray n: through (u, v) pixels from the top left, for `pixel`."""
-    dx, dy, dz = normalized(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
-                            view[1, 2] + u * view[2, 2] + v * view[3, 2])
-    put_ray(wave.rays, n, view[0, 0], view[0, 1], view[0, 2], dx, dy, dz, np.inf)
-    wave.weight[0, n] = wave.weight[1, n] = wave.weight[2, n] = 1
-    wave.owner[n] = n
+def _put(wave, n, target, places, pixel, x, y):
+    """Note that primary ray n goes through (x, y), for `pixel`."""
+    places[0, n & 7], places[1, n & 7] = x, y
     target[n] = pixel
+
+
+@inline
+def _aim(wave, n, places, view):
+    """Primary rays n .. n+7 through their places."""
+    ray, u, v = wave.rays.ray, load(places, 0, 0), load(places, 1, 0)
+    d = normalized(vec3(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
+                        view[1, 2] + u * view[2, 2] + v * view[3, 2]))
+    like = load(ray, OX, n)
+    store(ray, OX, n, zero(like) + view[0, 0])
+    store(ray, OX + 1, n, zero(like) + view[0, 1])
+    store(ray, OX + 2, n, zero(like) + view[0, 2])
+    store(ray, DX, n, rounded(d.x, like))
+    store(ray, DX + 1, n, rounded(d.y, like))
+    store(ray, DX + 2, n, rounded(d.z, like))
+    store(ray, START, n, zero(like))
+    store(ray, T, n, zero(like) + np.inf)
+    fill(wave.rays.prim, n, -1)
+    fill(wave.rays.depth, n, 0)
+    for k in range(3):
+        store(wave.weight, k, n, splat(np.float32(1)))
+    count_up(wave.owner, n, n)
 
 
 @kernel
@@ -27,7 +53,7 @@ def cast(wave, target, view, tile, sample, seed):
     of the picture. Rays run through blocks of 8 x 8 pixels, so that a packet is a compact bundle.
     """
     x0, y0, columns, rows, spacing, skip, width, height = tile
-    n = 0
+    n, places = 0, _new_places()
     for by in range(0, rows, 8):
         for bx in range(0, columns, 8):
             for j in range(by, min(by + 8, rows)):
@@ -38,8 +64,12 @@ def cast(wave, target, view, tile, sample, seed):
                     if x >= width or y >= height:
                         continue
                     u, v = jitter(y * width + x, sample, seed)
-                    _put(wave, n, target, view, y * width + x, u + x, v + y)
+                    _put(wave, n, target, places, y * width + x, u + x, v + y)
                     n += 1
+                    if n & 7 == 0:
+                        _aim(wave, n - 8, places, view)
+    if n & 7:
+        _aim(wave, n & -8, places, view)
     finish(wave.rays, n)
     return n
 
@@ -48,12 +78,16 @@ def cast(wave, target, view, tile, sample, seed):
 def cast_list(wave, target, view, width, pixels, seed):
     """Fill the wave with rays for a list of pixels and return their number; view and `target` as for `cast`. pixels (m, 3): a pixel's
     number, its first sample and the one after its last. A pixel's samples follow one another, so that a packet is a narrow bundle."""
-    n = 0
+    n, places = 0, _new_places()
     for i in range(len(pixels)):
         pixel, x, y = pixels[i, 0], pixels[i, 0] % width, pixels[i, 0] // width
         for sample in range(pixels[i, 1], pixels[i, 2]):
             u, v = jitter(pixel, sample, seed)
-            _put(wave, n, target, view, pixel, u + x, v + y)
+            _put(wave, n, target, places, pixel, u + x, v + y)
             n += 1
+            if n & 7 == 0:
+                _aim(wave, n - 8, places, view)
+    if n & 7:
+        _aim(wave, n & -8, places, view)
     finish(wave.rays, n)
     return n

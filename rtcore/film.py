@@ -10,7 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import kernel
+from rtcore.across import count
+from rtcore.jit import inline, kernel
+from rtcore.lanes import LANES, exceeds, load, load3, narrow, select, store, wide
+from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, store1, store_triples, turns
 from rtcore.sampling import REPLICATES
 from rtcore.wave import DEPTH_UNIT, NX, T
 
@@ -42,12 +45,30 @@ def new_film(width: int, height: int, samples: int = 2, lit: bool = False) -> Fi
 @kernel
 def note_first_hits(film, wave, n, target):
     """Which primitive each primary ray hit, how far away, and the normal there."""
-    for i in range(n):
-        prim, p = wave.rays.prim[i], target[i]
-        film.prim[p] = prim
-        film.distance[p] = wave.rays.ray[T, i]
-        for k in range(3):
-            film.normal[p, k] = wave.surface[NX + k, i] if prim >= 0 else 0
+    for i in range(0, n, LANES):
+        if i + LANES <= n and consecutive(target, i):
+            _note_eight(film, target[i], wave.rays, wave.surface, i)
+            continue
+        for j in range(i, min(i + LANES, n)):
+            _note_one(film, target[j], wave.rays, wave.surface, j)
+
+
+@inline
+def _note_eight(film, p, rays, surface, i):
+    """What rays i .. i+7, of pixels p .. p+7, hit."""
+    hit, normal = exceeds(rays.prim, i, -1), load3(surface, NX, i)
+    copy(film.prim, p, rays.prim, i)
+    store1(film.distance, p, narrow(load(rays.ray, T, i)))
+    store_triples(film.normal, p, narrow(select(hit, normal.x, 0)), narrow(select(hit, normal.y, 0)), narrow(select(hit, normal.z, 0)))
+
+
+@inline
+def _note_one(film, p, rays, surface, i):
+    """What ray i, of pixel p, hits."""
+    film.prim[p] = rays.prim[i]
+    film.distance[p] = rays.ray[T, i]
+    for k in range(3):
+        film.normal[p, k] = surface[NX + k, i] if rays.prim[i] >= 0 else 0
 
 
 @kernel
@@ -70,31 +91,61 @@ def note_lit(film, beam, n, target, share):
 @kernel
 def deposit(wave, n, sample):
     """Add the wave's light to the primary rays it descends from; sample (3, primary rays)."""
-    for i in range(n):
-        for k in range(3):
-            sample[k, wave.owner[i]] += wave.weight[k, i] * wave.light[k, i]
+    owner, weight, light = wave.owner, wave.weight, wave.light
+    for i in range(0, n, LANES):
+        if i + LANES <= n and consecutive(owner, i):
+            for k in range(3):
+                store(sample, k, owner[i], load(sample, k, owner[i]) + load(weight, k, i) * load(light, k, i))
+            continue
+        for j in range(i, min(i + LANES, n)):
+            for k in range(3):
+                sample[k, owner[j]] += weight[k, j] * light[k, j]
 
 
 @kernel
 def commit(film, sample, n, target):
     """Add one finished sample per target pixel; returns how many were not finite (they count as black)."""
     bad = 0
-    for i in range(n):
-        p = target[i]
-        r, g, b = np.float64(sample[0, i]), np.float64(sample[1, i]), np.float64(sample[2, i])
-        if not np.isfinite(r + g + b):
-            bad += 1
-            r = g = b = 0.0
-        film.total[p, 0] += r
-        film.total[p, 1] += g
-        film.total[p, 2] += b
-        if film.square.shape[0] > 0:
-            side = np.float32(1 - 2 * (film.count[p] % REPLICATES))     # samples come in order, so the count is the sample's number
-            film.split[p, 0] += side * np.float32(r)
-            film.split[p, 1] += side * np.float32(g)
-            film.split[p, 2] += side * np.float32(b)
-            film.square[p] += (r * r + g * g + b * b) / 3
-        film.count[p] += 1
+    for i in range(0, n, LANES):
+        if i + LANES <= n and consecutive(target, i):
+            bad += _commit_eight(film, target[i], wide(load(sample, 0, i)), wide(load(sample, 1, i)), wide(load(sample, 2, i)))
+            continue
+        for j in range(i, min(i + LANES, n)):
+            bad += _commit_one(film, target[j], np.float64(sample[0, j]), np.float64(sample[1, j]), np.float64(sample[2, j]))
+    return bad
+
+
+@inline
+def _commit_eight(film, p, r, g, b):
+    """A finished sample of each of pixels p .. p+7; returns how many were not finite."""
+    total = r + g + b
+    finite = total - total == 0
+    r, g, b = select(finite, r, 0), select(finite, g, 0), select(finite, b, 0)
+    add_triples(film.total, p, r, g, b)
+    if film.square.shape[0] > 0:
+        side = turns(film.count, p)
+        add_triples(film.split, p, side * narrow(r), side * narrow(g), side * narrow(b))
+        store1(film.square, p, load1(film.square, p) + (r * r + g * g + b * b) / 3)
+    add_one(film.count, p)
+    return LANES - count(finite)
+
+
+@inline
+def _commit_one(film, p, r, g, b):
+    """A finished sample of pixel p; says whether it was not finite."""
+    bad = not np.isfinite(r + g + b)
+    if bad:
+        r = g = b = 0.0
+    film.total[p, 0] += r
+    film.total[p, 1] += g
+    film.total[p, 2] += b
+    if film.square.shape[0] > 0:
+        side = np.float32(1 - 2 * (film.count[p] % REPLICATES))     # samples come in order, so the count is the sample's number
+        film.split[p, 0] += side * np.float32(r)
+        film.split[p, 1] += side * np.float32(g)
+        film.split[p, 2] += side * np.float32(b)
+        film.square[p] += (r * r + g * g + b * b) / 3
+    film.count[p] += 1
     return bad
 
 

@@ -1,16 +1,22 @@
 """Materials: what a surface shows of itself, what a light brings, which rays go on. Whitted's model, see `scene.Material`.
 
-All in float64 over the wave's columns: one ray at a time, since every ray may differ in material.
+All in float64 over the wave's columns, eight rays at a time; every ray may differ in material.
 """
 import math
 from typing import NamedTuple
 
 import numpy as np
 
+from rtcore.across import count, lowest_bit
+from rtcore.indices import chosen, pick, pick3, rows_of
 from rtcore.jit import inline, kernel
+from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, load3, narrow, root, rounded, select, size, splat, store,
+                          wide, with_sign, zero)
+from rtcore.neighbours import consecutive, load1, store1
+from rtcore.powers import floor
 from rtcore.scene import Background, Leaf, Material, invertible
-from rtcore.shapes.kind import normalized
-from rtcore.wave import DEPTH_UNIT, DX, DY, DZ, ERR, GLOSS, GX, GY, GZ, NX, NY, NZ, OPAQUE, POLISH, PX, PY, PZ, finish, put_ray
+from rtcore.shapes._surface import normalized
+from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
 
 # columns of Look.material
 (COLOR, AMBIENT, DIFFUSE, SPECULAR, SHININESS, REFLECTION, TRANSMISSION, IOR, FRESNEL, TINT, EMISSION, CHECKER, EVEN, ODD,
@@ -20,6 +26,9 @@ MATERIAL_COLUMNS = 37
 #: A ray that adds to its pixel less than this share of the light it meets is not followed: for white, a twentieth of the first step above
 #: black in an 8-bit picture.
 NEGLIGIBLE = 2.0 ** -16
+
+
+REFLECTED, REFRACTED = 0, 1     # sorts of rays that go on
 
 
 class Look(NamedTuple):
@@ -67,136 +76,197 @@ def _row(m: Material, matrix: np.ndarray) -> np.ndarray:
 
 
 @inline
-def _color(m, row, surface, i):
-    """Diffuse colour at hit i: plain, or that of the checker's cube just beneath the surface."""
-    if m[row, CHECKER] == 0:
-        return m[row, COLOR], m[row, COLOR + 1], m[row, COLOR + 2]
-    odd = 0
-    x, y, z = np.float64(surface[PX, i]), np.float64(surface[PY, i]), np.float64(surface[PZ, i])
+def _colors(m, row, surface, i):
+    """Diffuse colours at hits i .. i+7: plain, or that of the checker's cube just beneath the surface."""
+    color, patterned = pick3(m, row, COLOR), pick(m, row, CHECKER) > 0
+    if not any_lane(patterned):
+        return color
+    p, g = wide(load3(surface, PX, i)), wide(load3(surface, GX, i))
+    odd = zero(p.x)
     for k in range(3):
         q = PATTERN + 4 * k
-        at = m[row, q] * x + m[row, q + 1] * y + m[row, q + 2] * z + m[row, q + 3]
-        inward = m[row, q] * surface[GX, i] + m[row, q + 1] * surface[GY, i] + m[row, q + 2] * surface[GZ, i]
-        odd += int(np.floor(at / m[row, SIZE] - 1e-3 * np.sign(inward) * (abs(inward) > 1e-6)))
-    at = ODD if odd % 2 else EVEN
-    return m[row, at], m[row, at + 1], m[row, at + 2]
+        x, y, z = pick(m, row, q), pick(m, row, q + 1), pick(m, row, q + 2)
+        at = x * p.x + y * p.y + z * p.z + pick(m, row, q + 3)
+        inward = x * g.x + y * g.y + z * g.z
+        odd = odd + floor(at / pick(m, row, SIZE) - with_sign(select(size(inward) > 1e-6, 1e-3 + zero(at), 0), inward))
+    even = pick3(m, row, EVEN)
+    return select(patterned, select(2 * floor(odd / 2) == odd, even, pick3(m, row, ODD)), color)
 
 
 @inline
-def _faced(rays, surface, i):
-    """Unit geometric and shading normal on the side that ray i comes from, and 1 if that is the front, else -1."""
-    d = rays.ray
-    side = 1.0 if d[DX, i] * surface[GX, i] + d[DY, i] * surface[GY, i] + d[DZ, i] * surface[GZ, i] < 0 else -1.0
-    gx, gy, gz = side * surface[GX, i], side * surface[GY, i], side * surface[GZ, i]
-    nx, ny, nz = side * surface[NX, i], side * surface[NY, i], side * surface[NZ, i]
-    return gx, gy, gz, nx, ny, nz, side
+def _faced(ray, surface, i):
+    """Unit geometric and shading normals on the sides that rays i .. i+7 come from, and 1 where that is the front, else -1."""
+    d, g, n = wide(load3(ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, NX, i))
+    side = select(d.x * g.x + d.y * g.y + d.z * g.z < 0, 1, zero(d.x) - 1)
+    return g * side, n * side, side
 
 
 @kernel
 def glow(wave, n, look, answer):
     """Light without lights: the background, emission, and the ambient light returned; and, for lights to come, `Beam.answer` if it has
     room. Fog comes later: fade becomes 1."""
-    rays, m, b, lit = wave.rays, look.material, look.backdrop, answer.shape[1] > 0
-    for i in range(n):
-        wave.fade[i] = 1
-        p = rays.prim[i]
-        if p < 0:
-            up = 0.5 + 0.5 * (rays.ray[DX, i] * b[2, 0] + rays.ray[DY, i] * b[2, 1] + rays.ray[DZ, i] * b[2, 2])
-            for k in range(3):
-                wave.light[k, i] = b[0, k] + up * (b[1, k] - b[0, k])
-            continue
-        row = look.of[p]
-        r, g, b_ = _color(m, row, wave.surface, i)
-        share = m[row, AMBIENT]
-        wave.light[0, i] = m[row, EMISSION] + share * r * look.ambient[0]
-        wave.light[1, i] = m[row, EMISSION + 1] + share * g * look.ambient[1]
-        wave.light[2, i] = m[row, EMISSION + 2] + share * b_ * look.ambient[2]
-        if lit:
-            diffuse = m[row, DIFFUSE]
-            answer[0, i], answer[1, i], answer[2, i] = diffuse * r, diffuse * g, diffuse * b_
-            answer[GLOSS, i], answer[POLISH, i] = m[row, SPECULAR], m[row, SHININESS]
+    prim, ray, surface, light, fade = wave.rays.prim, wave.rays.ray, wave.surface, wave.light, wave.fade
+    m, of, ambient, b, lit = look.material, look.of, look.ambient, look.backdrop, answer.shape[1] > 0
+    for i in range(0, n, LANES):
+        store1(fade, i, splat(np.float32(1)))
+        hit, d = exceeds(prim, i, -1), wide(load3(ray, DX, i))
+        up = 0.5 + 0.5 * (d.x * b[2, 0] + d.y * b[2, 1] + d.z * b[2, 2])
+        red, green, blue = b[0, 0] + up * (b[1, 0] - b[0, 0]), b[0, 1] + up * (b[1, 1] - b[0, 1]), b[0, 2] + up * (b[1, 2] - b[0, 2])
+        if any_lane(hit):
+            row = chosen(of, rows_of(prim, i, 0, hit))
+            color, own, share = _colors(m, row, surface, i), pick3(m, row, EMISSION), pick(m, row, AMBIENT)
+            red = select(hit, own.x + share * color.x * ambient[0], red)
+            green = select(hit, own.y + share * color.y * ambient[1], green)
+            blue = select(hit, own.z + share * color.z * ambient[2], blue)
+            if lit:
+                diffuse = pick(m, row, DIFFUSE)
+                store(answer, 0, i, narrow(diffuse * color.x))
+                store(answer, 1, i, narrow(diffuse * color.y))
+                store(answer, 2, i, narrow(diffuse * color.z))
+                store(answer, GLOSS, i, narrow(pick(m, row, SPECULAR)))
+                store(answer, POLISH, i, narrow(pick(m, row, SHININESS)))
+        store(light, 0, i, narrow(red))
+        store(light, 1, i, narrow(green))
+        store(light, 2, i, narrow(blue))
 
 
 @kernel
 def gather(wave, beam, n):
     """Add what the beam's n rays bring where nothing opaque is in the way; returns how many met something opaque."""
-    rays, blocked = beam.rays, 0
-    for j in range(n):
-        if rays.prim[j] >= 0:
-            blocked += 1
+    prim, depths, owner, bring, light, blocked = beam.rays.prim, beam.rays.depth, beam.owner, beam.bring, wave.light, 0
+    for j in range(0, n, LANES):
+        stopped = exceeds(prim, j, -1)
+        if j + LANES <= n and not any_lane(exceeds(depths, j, 0)) and consecutive(owner, j):
+            blocked += count(stopped)
+            for k in range(3):
+                store(light, k, owner[j], load(light, k, owner[j]) + select(stopped, 0, load(bring, k, j)))
             continue
-        i, depth = beam.owner[j], rays.depth[j]
-        through = 1.0 if depth == 0 else np.exp(-depth * DEPTH_UNIT)
-        for k in range(3):
-            wave.light[k, i] += through * beam.bring[k, j]
+        for at in range(j, min(j + LANES, n)):
+            if prim[at] >= 0:
+                blocked += 1
+                continue
+            i, depth = owner[at], depths[at]
+            through = 1.0 if depth == 0 else np.exp(-depth * DEPTH_UNIT)
+            for k in range(3):
+                light[k, i] += through * bring[k, at]
     return blocked
 
 
 @inline
 def fresnel(cosine, eta):
     """Share of unpolarised light that a dielectric reflects (Fresnel). cosine: of the angle of incidence, 0 .. 1; eta: index of
-    refraction of where the light comes from over that of where it goes. 1 for total reflection."""
+    refraction of where the light comes from over that of where it goes. 1 for total reflection. Lanes."""
     square = 1 - eta * eta * (1 - cosine * cosine)
-    if square <= 0:
-        return 1.0
-    inner = np.sqrt(square)
+    inner = root(square)
     parallel = (cosine - eta * inner) / (cosine + eta * inner)
     across = (eta * cosine - inner) / (eta * cosine + inner)
-    return 0.5 * (parallel * parallel + across * across)
+    return select(square <= 0, 1, 0.5 * (parallel * parallel + across * across))
+
+
+@inline
+def _shares(m, row, cosine, eta, square):
+    """How much of what comes along each of eight rays is reflected and how much transmitted; `square` below 0 is total reflection."""
+    reflection, transmission = pick(m, row, REFLECTION), pick(m, row, TRANSMISSION)
+    clear, inward, smooth = transmission > 0, square <= 0, pick(m, row, FRESNEL) > 0
+    plain = clear & inward & ~smooth
+    mirrored, passed = select(plain, reflection + transmission, reflection), select(plain, 0, transmission)
+    if any_lane(smooth):
+        share = fresnel(cosine, eta)
+        # what the surface lets pass is shared out by the angle; `reflection` scales the mirrored part
+        mirrored = select(smooth, select(clear & inward, 1, reflection) * share, mirrored)
+        passed = select(smooth & clear, transmission * (1 - share), passed)
+    return mirrored, passed
+
+
+@inline
+def _go_on(made, carried, lane, wave, m, row, i, share, p, d, like):
+    """Note eight rays from p along d, which bring the pixel this share; returns those worth following, as bits."""
+    fade = share * wide(load1(wave.fade, i))
+    r = fade * wide(load(wave.weight, 0, i)) * pick(m, row, TINT)
+    g = fade * wide(load(wave.weight, 1, i)) * pick(m, row, TINT + 1)
+    b = fade * wide(load(wave.weight, 2, i)) * pick(m, row, TINT + 2)
+    d = normalized(d)
+    store(made, OX, lane, rounded(p.x, like))
+    store(made, OX + 1, lane, rounded(p.y, like))
+    store(made, OX + 2, lane, rounded(p.z, like))
+    store(made, DX, lane, rounded(d.x, like))
+    store(made, DX + 1, lane, rounded(d.y, like))
+    store(made, DX + 2, lane, rounded(d.z, like))
+    store(carried, 0, lane, narrow(r))
+    store(carried, 1, lane, narrow(g))
+    store(carried, 2, lane, narrow(b))
+    return greatest(r, greatest(g, b)) > NEGLIGIBLE
+
+
+@inline
+def _take(child, i, made, carried, lane, owner, parent, sort):
+    """Ray i of the child wave: the one noted in a lane, which descends from column `parent`."""
+    for k in range(6):
+        child.rays.ray[k, i] = made[k, lane]
+    for k in range(3):
+        child.weight[k, i] = carried[k, lane]
+    child.owner[i], child.source[i] = owner[parent], 2 * parent + sort
+
+
+@inline
+def _start(rays, i):
+    """Let rays i .. i+7 have met nothing yet."""
+    none = zero(load(rays.ray, START, i))
+    store(rays.ray, START, i, none)
+    store(rays.ray, T, i, none + np.inf)
+    fill(rays.prim, i, -1)
+    fill(rays.depth, i, 0)
 
 
 @kernel
 def bounce(wave, n, look, child, counts):
     """The reflected and refracted rays of the wave's hits into `child`, which needs room for 2n; returns their number. A hit's two rays
     stand side by side, so that the order does not depend on the rest of the wave. counts[0], counts[1] grow by each sort's number."""
-    rays, surface, m = wave.rays, wave.surface, look.material
-    count = 0
-    for i in range(n):
-        p = rays.prim[i]
-        if p < 0:
+    prim, ray, surface, m, of = wave.rays.prim, wave.rays.ray, wave.surface, look.material, look.of
+    like = load(ray, OX, 0)
+    made, carried = np.empty((6, 2 * LANES), ray.dtype), np.empty((3, 2 * LANES), np.float32)
+    total = 0
+    for i in range(0, n, LANES):
+        hit = exceeds(prim, i, -1)
+        if not any_lane(hit):
             continue
-        row = look.of[p]
-        reflection, transmission = m[row, REFLECTION], m[row, TRANSMISSION]
-        if reflection == 0 and transmission == 0:
+        row = chosen(of, rows_of(prim, i, 0, hit))
+        hit = hit & ((pick(m, row, REFLECTION) > 0) | (pick(m, row, TRANSMISSION) > 0))
+        if not any_lane(hit):
             continue
-        gx, gy, gz, nx, ny, nz, side = _faced(rays, surface, i)
-        dx, dy, dz = np.float64(rays.ray[DX, i]), np.float64(rays.ray[DY, i]), np.float64(rays.ray[DZ, i])
-        cosine = -(dx * nx + dy * ny + dz * nz)
-        if cosine <= 0:     # an interpolated normal that looks away from the eye
-            nx, ny, nz = gx, gy, gz
-            cosine = -(dx * nx + dy * ny + dz * nz)
-        eta = 1 / m[row, IOR] if side > 0 else m[row, IOR]
+        d = wide(load3(ray, DX, i))
+        g, normal, side = _faced(ray, surface, i)
+        cosine = -(d.x * normal.x + d.y * normal.y + d.z * normal.z)
+        away = cosine <= 0      # an interpolated normal that looks away from the eye
+        normal = select(away, g, normal)
+        cosine = select(away, -(d.x * normal.x + d.y * normal.y + d.z * normal.z), cosine)
+        eta = pick(m, row, IOR)
+        eta = select(side > 0, 1 / eta, eta)
         square = 1 - eta * eta * (1 - cosine * cosine)
-        if transmission > 0:
-            if m[row, FRESNEL] != 0:
-                share = fresnel(cosine, eta)
-                # what the surface lets pass is shared out by the angle; `reflection` scales the mirrored part
-                reflection, transmission = (1.0 if square <= 0 else reflection) * share, transmission * (1 - share)
-            elif square <= 0:
-                reflection, transmission = reflection + transmission, 0.0
-        elif m[row, FRESNEL] != 0:
-            reflection = reflection * fresnel(cosine, eta)
-        fade, err = np.float64(wave.fade[i]), np.float64(surface[ERR, i])
-        for way in range(2):
-            share = reflection if way == 0 else transmission
-            r = share * fade * wave.weight[0, i] * m[row, TINT]
-            g = share * fade * wave.weight[1, i] * m[row, TINT + 1]
-            b = share * fade * wave.weight[2, i] * m[row, TINT + 2]
-            if not max(r, max(g, b)) > NEGLIGIBLE:
-                continue
-            if way == 0:
-                x, y, z, away = dx + 2 * cosine * nx, dy + 2 * cosine * ny, dz + 2 * cosine * nz, err
-                if x * gx + y * gy + z * gz <= 0:       # below the true surface: mirror about that instead
-                    c = dx * gx + dy * gy + dz * gz
-                    x, y, z = dx - 2 * c * gx, dy - 2 * c * gy, dz - 2 * c * gz
-            else:
-                c = eta * cosine - np.sqrt(square)
-                x, y, z, away = eta * dx + c * nx, eta * dy + c * ny, eta * dz + c * nz, -err
-            x, y, z = normalized(x, y, z)
-            put_ray(child.rays, count, surface[PX, i] + away * gx, surface[PY, i] + away * gy, surface[PZ, i] + away * gz, x, y, z, np.inf)
-            child.weight[0, count], child.weight[1, count], child.weight[2, count] = r, g, b
-            child.owner[count], child.source[count] = wave.owner[i], 2 * i + way
-            counts[way] += 1
-            count += 1
-    finish(child.rays, count)
-    return count
+        reflection, transmission = _shares(m, row, cosine, eta, square)
+        p, err = wide(load3(surface, PX, i)), wide(load(surface, ERR, i))
+        reflected = refracted = 0
+        if any_lane(hit & (reflection > 0)):
+            way = d + normal * (2 * cosine)
+            below = way.x * g.x + way.y * g.y + way.z * g.z <= 0        # the true surface: mirror about that instead
+            way = select(below, d - g * (2 * (d.x * g.x + d.y * g.y + d.z * g.z)), way)
+            reflected = bits(hit & _go_on(made, carried, 0, wave, m, row, i, reflection, p + g * err, way, like))
+        if any_lane(hit & (transmission > 0)):
+            way = d * eta + normal * (eta * cosine - root(square))
+            refracted = bits(hit & _go_on(made, carried, LANES, wave, m, row, i, transmission, p - g * err, way, like))
+        todo = reflected | refracted
+        while todo:
+            lane = lowest_bit(todo)
+            todo &= todo - 1
+            if (reflected >> lane) & 1:
+                _take(child, total, made, carried, lane, wave.owner, i + lane, REFLECTED)
+                total += 1
+                counts[REFLECTED] += 1
+            if (refracted >> lane) & 1:
+                _take(child, total, made, carried, LANES + lane, wave.owner, i + lane, REFRACTED)
+                total += 1
+                counts[REFRACTED] += 1
+    for i in range(0, total, LANES):
+        _start(child.rays, i)
+    finish(child.rays, total)
+    return total

@@ -9,13 +9,15 @@ from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, n
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.expansions import LONG, expand
+from rtcore.indices import among, rows_of
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, greatest, least, load, load3, rounded, select, size, splat3, wide, with_sign
+from rtcore.lanes import (LANES, any_lane, bits, greatest, least, load, load3, rounded, select, size, splat3, vec3, wide, with_sign, zero)
 from rtcore.pairs import divide, subtract
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U64, extent, lowest
 from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs
-from rtcore.shapes.kind import FRONT, OWN, Kind, Packed, forward, placed, placed_bounds, put_placed, unit_hit
+from rtcore.shapes._surface import put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes.kind import FRONT, OWN, Kind, Packed, forward, placed, placed_bounds
 from rtcore.wave import DX, OX, SLOW, START, alive, record, record_one, until
 
 HALF = BEYOND       # columns of Table.exact: half the box's edges, in two parts
@@ -186,23 +188,22 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            x, y, z = unit_hit(rays, i, table.data, q)
-            nx, ny, nz = 0.0, 0.0, 0.0
+    prim, data = rays.prim, table.data
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            q = rows_of(prim, i, first, ok)
+            p = unit_hits(rays, i, data, q)
+            x, y, z, one = size(p.x), size(p.y), size(p.z), 1 + zero(p.x)
             # the face is the one whose plane the point is nearest to; the point is put onto it
-            if abs(x) >= max(abs(y), abs(z)):
-                nx = np.copysign(1.0, x)
-                x, u, v = nx, y, z
-            elif abs(y) >= abs(z):
-                ny = np.copysign(1.0, y)
-                y, u, v = ny, z, x
-            else:
-                nz = np.copysign(1.0, z)
-                z, u, v = nz, x, y
-            put_placed(out, i, table.data, q, x, y, z, nx, ny, nz, (u + 1) / 2, (v + 1) / 2)
+            on_x = (x >= y) & (x >= z)
+            on_y = (y >= z) & ~on_x
+            on_z = ~on_x & ~on_y
+            a, b, c = with_sign(one, p.x), with_sign(one, p.y), with_sign(one, p.z)
+            put_all_placed(out, i, ok, data, q, vec3(select(on_x, a, p.x), select(on_y, b, p.y), select(on_z, c, p.z)),
+                           vec3(select(on_x, a, 0), select(on_y, b, 0), select(on_z, c, 0)))
+            u, v = select(on_x, p.y, select(on_y, p.z, p.x)), select(on_x, p.z, select(on_y, p.x, p.y))
+            put_coordinates(out, i, ok, (u + 1) / 2, (v + 1) / 2)
 
 
 def _bounds(data, extra):

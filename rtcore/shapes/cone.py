@@ -13,16 +13,18 @@ from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, n
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.expansions import LONG, NOISE, clear, expand, put_products
 from rtcore.fields import FieldError, Flag, Number, Vec, Vector
+from rtcore.indices import among, pick, rows_of
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import along, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
+from rtcore.lanes import (LANES, along, any_lane, bits, dot, least, load, load3, root, rounded, select, size, splat3, vec3, wide, zero)
 from rtcore.pairs import add, divide, multiply, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
 from rtcore.shapes._second import BOX, FORM, IN_SLAB, approach, form_of, heights, line_form, may_meet, noise_along
 from rtcore.shapes._unit import BEYOND, INTO, PLACE, into_plain, line_expanded, line_in_pairs
-from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, around, forward, placed, put_placed, unit_hit
-from rtcore.wave import DX, OX, SLOW, START, T, alive, record, record_one, until
+from rtcore.shapes._surface import angles, new_room, put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes.kind import BACK, FRONT, OWN, Kind, Packed, forward, placed
+from rtcore.wave import DX, OX, SLOW, START, T, U, alive, record, record_one, until
 
 #: Columns after the placing: radius at z = 0 and what it grows by; whether there are caps below and above; the largest number of L, that of
 #: the form's second-degree part, how far the frustum reaches from its middle in the form's units.
@@ -269,26 +271,25 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    data = table.data
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            x, y, z = unit_hit(rays, i, data, q)
-            base, slope = np.float64(data[q, BASE]), np.float64(data[q, SLOPE])
-            radius, off = base + slope * z, np.sqrt(x * x + y * y)
-            beside, below, above = abs(off - radius), abs(z), abs(z - 1)
-            below, above = below if data[q, LOWER] > 0 else np.inf, above if data[q, UPPER] > 0 else np.inf
-            if min(below, above) < beside:
-                z = 0.0 if below < above else 1.0
-                put_placed(out, i, data, q, x, y, z, 0.0, 0.0, 2 * z - 1, (x + 1) / 2, (y + 1) / 2)
-            else:
-                u = around(out, y, x)
-                if off > 0 and radius > 0:
-                    x, y = x / off * radius, y / off * radius
-                    put_placed(out, i, data, q, x, y, z, x / radius, y / radius, -slope, u, z)
-                else:       # the apex has no normal: the axis stands in
-                    put_placed(out, i, data, q, x, y, z, 0.0, 0.0, 1.0 if slope < 0 else -1.0, u, z)
+    prim, data, room = rays.prim, table.data, new_room()
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            q = rows_of(prim, i, first, ok)
+            p, slope, none = unit_hits(rays, i, data, q), pick(data, q, SLOPE), zero(pick(data, q, BASE))
+            radius, off = pick(data, q, BASE) + slope * p.z, root(p.x * p.x + p.y * p.y)
+            below = select(pick(data, q, LOWER) > 0, size(p.z), np.inf)
+            above = select(pick(data, q, UPPER) > 0, size(p.z - 1), np.inf)
+            cap = least(below, above) < size(off - radius)
+            end = select(below < above, none, 1)
+            # the apex has no normal: the axis stands in
+            side = ~cap & (off > 0) & (radius > 0)
+            x, y = select(side, p.x / off * radius, p.x), select(side, p.y / off * radius, p.y)
+            axis = select(cap, 2 * end - 1, select(side, -slope, select(slope < 0, 1 + none, -1)))
+            normal = vec3(select(side, x / radius, 0), select(side, y / radius, 0), axis)
+            put_all_placed(out, i, ok, data, q, vec3(x, y, select(cap, end, p.z)), normal)
+            if out.shape[0] > U:
+                put_coordinates(out, i, ok, select(cap, (p.x + 1) / 2, angles(room, p.y, p.x)), select(cap, (p.y + 1) / 2, p.z))
 
 
 def _bounds(data, extra):

@@ -117,19 +117,6 @@ def unit_hit(rays, i, data, p):
 
 
 @inline
-def put_flat(rays, i, out, data, p, column):
-    """Surface rows of a hit on the plane through data[p, 0..2] with normal data[p, column..]; texture coordinates along the two axes
-    that the normal points at least."""
-    cx, cy, cz = np.float64(data[p, 0]), np.float64(data[p, 1]), np.float64(data[p, 2])
-    nx, ny, nz = normalized(np.float64(data[p, column]), np.float64(data[p, column + 1]), np.float64(data[p, column + 2]))
-    x, y, z = hit_from(rays, i, cx, cy, cz)
-    height = x * nx + y * ny + z * nz
-    x, y, z = x - height * nx, y - height * ny, z - height * nz
-    u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
-    put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))))
-
-
-@inline
 def put_placed(out, i, data, p, x, y, z, nx, ny, nz, u, v):
     """Surface rows of a placed primitive from its point and normal in unit space. The point comes from the unit shape, not from the
     ray, so its error does not grow with the distance of the eye."""

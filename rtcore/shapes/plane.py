@@ -5,12 +5,14 @@ import numpy as np
 
 from rtcore.exact import moved
 from rtcore.fields import Vec, Vector
+from rtcore.indices import among, rows_of
 from rtcore.jit import kernel
-from rtcore.lanes import any_lane, bits
+from rtcore.lanes import LANES, any_lane, bits
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes._flat import NORMAL, approach, exact_plane, meet, settle
-from rtcore.shapes.kind import Kind, Packed, put_flat
+from rtcore.shapes._surface import put_flats
+from rtcore.shapes.kind import Kind, Packed
 from rtcore.wave import record
 
 
@@ -46,11 +48,11 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            put_flat(rays, i, out, table.data, q, 3)
+    prim, data = rays.prim, table.data
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            put_flats(rays, i, ok, out, data, rows_of(prim, i, first, ok), 3)
 
 
 PLANE = Kind("plane", intersect, surface, None, (Plane((0, 0, 0), (0, 1, 0)), ()))

@@ -9,13 +9,15 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vectors
+from rtcore.indices import among, rows_of
 from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, bits, load, size, wide
+from rtcore.lanes import LANES, any_lane, bits, load, size, wide
 from rtcore.pairs import add, divide, multiply, scale, subtract, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U64, lowest
 from rtcore.shapes._flat import NORMAL, POINT, approach, exact_plane, height_and_speed, meet, settle
-from rtcore.shapes.kind import Kind, Packed, put_flat
+from rtcore.shapes._surface import put_flats
+from rtcore.shapes.kind import Kind, Packed
 from rtcore.wave import DX, OX, record
 
 FLAT, DROP, FIRST, COUNT = 3, 6, 7, 8       # columns after the middle: normal, axis to drop, where the outline begins, its length
@@ -169,11 +171,11 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            put_flat(rays, i, out, table.data, q, FLAT)
+    prim, data = rays.prim, table.data
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            put_flats(rays, i, ok, out, data, rows_of(prim, i, first, ok), FLAT)
 
 
 def _bounds(data, extra):

@@ -14,15 +14,16 @@ from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, n
 from rtcore.exact import inverse, moved, parts
 from rtcore.expansions import LONG, expand, noise_of
 from rtcore.fields import Number, Vec, Vector
+from rtcore.indices import among, pick, pick3, rows_of
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
+from rtcore.lanes import LANES, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
 from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
 from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs, noise_here
-from rtcore.shapes.kind import (CENTER, OWN, Kind, Packed, around, forward, into, normalized, placed, placed_bounds, power_near, put_placed,
-                                put_surface, unit_hit)
-from rtcore.wave import DX, OX, START, T, U, alive, record, until
+from rtcore.shapes._surface import extent_of, hits_from, new_room, normalized, put_all_placed, put_globe, put_surfaces, unit_hits
+from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, forward, into, placed, placed_bounds, power_near
+from rtcore.wave import DX, OX, START, T, alive, record, until
 
 
 MOST = OWN      # ellipsoids: column of the largest number of the matrix L into unit space
@@ -152,24 +153,16 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    for i in range(n):
-        p = rays.prim[i]
-        if first <= p < last:
-            q = p - first
-            t, r = np.float64(rays.ray[T, i]), np.float64(table.data[q, 3]) * table.data[q, 4]
-            cx, cy, cz = np.float64(table.data[q, 0]), np.float64(table.data[q, 1]), np.float64(table.data[q, 2])
-            nx, ny, nz = normalized(rays.ray[OX, i] + t * rays.ray[DX, i] - cx, rays.ray[OX + 1, i] + t * rays.ray[DX + 1, i] - cy,
-                                    rays.ray[OX + 2, i] + t * rays.ray[DX + 2, i] - cz)
+    prim, data, room = rays.prim, table.data, new_room()
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            q = rows_of(prim, i, first, ok)
+            c, r = pick3(data, q, 0), pick(data, q, 3) * pick(data, q, 4)
+            normal = normalized(hits_from(rays, i, c))
             # the point is brought back onto the sphere: its error does not grow with the distance of the eye
-            put_surface(out, i, cx + r * nx, cy + r * ny, cz + r * nz, nx, ny, nz, *globe(out, nx, ny, nz),
-                        max(abs(cx), max(abs(cy), abs(cz))) + r)
-
-
-@inline
-def globe(out, x, y, z):
-    """Longitude and latitude of a unit vector, each 0 .. 1; the poles are on z."""
-    return around(out, y, x), np.arccos(min(max(-z, -1.0), 1.0)) / np.pi if out.shape[0] > U else 0.0
+            put_surfaces(out, i, ok, c + normal * r, normal, extent_of(c) + r)
+            put_globe(out, i, ok, room, normal)
 
 
 @inline
@@ -244,13 +237,14 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface_ellipsoid(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            x, y, z = normalized(*unit_hit(rays, i, table.data, q))
-            u, v = globe(out, x, y, z)
-            put_placed(out, i, table.data, q, x, y, z, x, y, z, u, v)
+    prim, data, room = rays.prim, table.data, new_room()
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            q = rows_of(prim, i, first, ok)
+            p = normalized(unit_hits(rays, i, data, q))
+            put_all_placed(out, i, ok, data, q, p, p)
+            put_globe(out, i, ok, room, p)
 
 
 def _bounds(data, extra):

@@ -10,12 +10,14 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
 from rtcore.across import lowest_bit
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
+from rtcore.indices import among, flagged, pick3, put3, rows_of
 from rtcore.jit import inline, kernel, out_of_line
-from rtcore.lanes import any_lane, bits, fma, load, load3, select, size, store
+from rtcore.lanes import LANES, any_lane, bits, fma, greatest, least, load, load3, select, size, store, vec3
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
-from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed, hit_from, normalized, put_surface
-from rtcore.wave import DX, NX, NY, NZ, OX, SLOW, record, record_one
+from rtcore.shapes._surface import extent_of, hits_from, normalized, put_coordinates, put_surfaces
+from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed
+from rtcore.wave import DX, NX, OX, SLOW, record, record_one
 
 
 #: Twice a triangle's area, seen along the ray, below which products may have lost digits to underflow.
@@ -239,36 +241,43 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    data, extra = table.data, table.extra
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            ax, ay, az = np.float64(data[q, 0]), np.float64(data[q, 1]), np.float64(data[q, 2])
-            ex, ey, ez = data[q, 3] - ax, data[q, 4] - ay, data[q, 5] - az
-            fx, fy, fz = data[q, 6] - ax, data[q, 7] - ay, data[q, 8] - az
-            sx, sy, sz = hit_from(rays, i, ax, ay, az)
-            longest = max(max(abs(ex), max(abs(ey), abs(ez))), max(abs(fx), max(abs(fy), abs(fz))))
-            ex, ey, ez, fx, fy, fz = ex / longest, ey / longest, ez / longest, fx / longest, fy / longest, fz / longest
-            sx, sy, sz = sx / longest, sy / longest, sz / longest
-            nx, ny, nz = ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx
-            square = nx * nx + ny * ny + nz * nz
+    prim, data, extra, side = rays.prim, table.data, table.extra, table.side
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            q = rows_of(prim, i, first, ok)
+            a = pick3(data, q, 0)
+            e, f, s = pick3(data, q, 3) - a, pick3(data, q, 6) - a, hits_from(rays, i, a)
+            longest = greatest(extent_of(e), extent_of(f))
+            e, f, s = by(e, longest), by(f, longest), by(s, longest)
+            normal = across(e, f)
+            square = normal.x * normal.x + normal.y * normal.y + normal.z * normal.z
             # barycentrics of the foot of the hit on the triangle's plane
-            beta = ((sy * fz - sz * fy) * nx + (sz * fx - sx * fz) * ny + (sx * fy - sy * fx) * nz) / square
-            gamma = ((ey * sz - ez * sy) * nx + (ez * sx - ex * sz) * ny + (ex * sy - ey * sx) * nz) / square
-            beta = min(max(beta, 0.0), 1.0)
-            gamma = min(max(gamma, 0.0), 1.0 - beta)
-            nx, ny, nz = normalized(nx, ny, nz)
-            if table.side[q] & MIRRORED:
-                nx, ny, nz = -nx, -ny, -nz
-            x, y, z = (beta * ex + gamma * fx) * longest, (beta * ey + gamma * fy) * longest, (beta * ez + gamma * fz) * longest
-            put_surface(out, i, ax + x, ay + y, az + z, nx, ny, nz, beta, gamma, max(abs(ax), max(abs(ay), abs(az))) + longest)
+            p, r = across(s, f), across(e, s)
+            beta = (p.x * normal.x + p.y * normal.y + p.z * normal.z) / square
+            gamma = (r.x * normal.x + r.y * normal.y + r.z * normal.z) / square
+            beta = least(greatest(beta, 0), 1)
+            gamma = least(greatest(gamma, 0), 1 - beta)
+            normal = normalized(normal)
+            normal = select(flagged(side, q, MIRRORED), -normal, normal)
+            put_surfaces(out, i, ok, a + (e * beta + f * gamma) * longest, normal, extent_of(a) + longest)
+            put_coordinates(out, i, ok, beta, gamma)
             if extra.shape[0] > 0:
-                mx = extra[q, 0] + beta * (extra[q, 3] - extra[q, 0]) + gamma * (extra[q, 6] - extra[q, 0])
-                my = extra[q, 1] + beta * (extra[q, 4] - extra[q, 1]) + gamma * (extra[q, 7] - extra[q, 1])
-                mz = extra[q, 2] + beta * (extra[q, 5] - extra[q, 2]) + gamma * (extra[q, 8] - extra[q, 2])
-                if mx * mx + my * my + mz * mz > 0:
-                    out[NX, i], out[NY, i], out[NZ, i] = normalized(mx, my, mz)
+                m = pick3(extra, q, 0)
+                m = m + (pick3(extra, q, 3) - m) * beta + (pick3(extra, q, 6) - m) * gamma
+                put3(out, NX, i, ok & (m.x * m.x + m.y * m.y + m.z * m.z > 0), normalized(m))
+
+
+@inline
+def by(v, x):
+    """v / x."""
+    return vec3(v.x / x, v.y / x, v.z / x)
+
+
+@inline
+def across(e, f):
+    """e x f with no product fused."""
+    return vec3(e.y * f.z - e.z * f.y, e.z * f.x - e.x * f.z, e.x * f.y - e.y * f.x)
 
 
 def _bounds(data, extra):
