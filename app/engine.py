@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from rtcore.progressive import Frame, RenderRequest
 
 
+ANSWER, MOTION = 0.1, 1 / 30    # seconds within which the first picture of a change is to be seen, and that of a step of a drag
+
+
 class Job(NamedTuple):
     """What the window wants to see. Jobs are numbered in the order they are asked for."""
 
@@ -44,7 +47,7 @@ class Engine:
     def __init__(self):
         from rtcore import film, progressive, warm
         self._film, self._progressive, self._warm = film, progressive, warm
-        self._renderer = progressive.Renderer()
+        self._renderer = progressive.Renderer(keep=True)
         self._warmed: tuple[Scene, Options, bool] | None = None
 
     def request(self, job: Job) -> "RenderRequest":
@@ -62,9 +65,9 @@ class Engine:
         self._warmed = None if names else (job.scene, job.options, lens)
         return names
 
-    def frames(self, request: "RenderRequest", cancelled: Callable[[], bool]) -> "Iterator[Frame]":
-        """The passes of a picture, from coarse to fine."""
-        return self._renderer.frames(request, cancelled)
+    def frames(self, request: "RenderRequest", cancelled: Callable[[], bool], dragged: bool) -> "Iterator[Frame]":
+        """The passes of a picture, from coarse to fine; the first one in time for the eye to take it for an answer, or for a motion."""
+        return self._renderer.frames(request, cancelled, deadline=MOTION if dragged else ANSWER)
 
     def encode(self, pixels: np.ndarray, out: np.ndarray, gain: float):
         """Linear light, multiplied by the gain, into the bytes of QImage.Format_RGB32."""

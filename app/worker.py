@@ -136,7 +136,7 @@ class Worker(QObject):
                 return self._closing or (self._paused and whole)
             return shown > 0 or not newer.continues or time.monotonic() - started > PATIENCE
 
-        for frame in engine.frames(request, cancelled):
+        for frame in engine.frames(request, cancelled, job.continues):
             self._show(engine, frame, job)
             shown, whole = shown + 1, frame.samples > 0
             if cancelled():

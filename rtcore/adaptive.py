@@ -92,14 +92,17 @@ def rmse_estimate(film: Film, width: int, height: int) -> float | None:
 
 
 def refinement(film: Film, width: int, height: int, order: np.ndarray, budget: float, growth: float = GROWTH,
-               enough: float = CONVERGED) -> Pass | None:
+               enough: float = CONVERGED, inside: np.ndarray | None = None) -> Pass | None:
     """The next pass: the pixels, in `order`, that get more samples, each in all a power of two, so that the expected error of the picture
     is the least for the pass's cost. budget: samples the whole picture may have, per pixel. None if it is spent; a pass without pixels if
-    no pixel's error is larger than `enough`."""
+    no pixel's error is larger than `enough`. inside: bool (h·w), pixels that are a picture of their own; the others get none."""
     squared = squared_errors(film, width, height)
+    if inside is not None:
+        squared[~inside] = 0
     open_ = np.flatnonzero(squared > enough ** 2)
-    spent = int(film.count.sum(dtype=np.int64))
-    left = min(budget * width * height - spent, growth * spent)
+    spent = int(film.count.sum(dtype=np.int64, where=True if inside is None else inside))
+    pixels = width * height if inside is None else np.count_nonzero(inside)
+    left = min(budget * pixels - spent, growth * spent)
     if len(open_) == 0:
         return Pass(1, False, range(0), np.empty((0, 3), np.int32))
     n = film.count[open_]

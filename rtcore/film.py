@@ -42,6 +42,17 @@ def new_film(width: int, height: int, samples: int = 2, lit: bool = False) -> Fi
                 np.full(n if lit else 0, np.float32(0)))
 
 
+def suits(film: Film, samples: int, lit: bool) -> bool:
+    """Whether a film of the right size has the arrays for so many samples per pixel, and those for lights if wanted."""
+    return (len(film.square) > 0) == (samples > 1) and (len(film.lit) > 0 or not lit)
+
+
+def clear(film: Film) -> None:
+    """Let it be a new film. First hits stay until others are noted: where there is no sample they are not looked at."""
+    for array in (film.total, film.split, film.square, film.count):
+        array.fill(0)
+
+
 @kernel
 def note_first_hits(film, wave, n, target):
     """Which primitive each primary ray hit, how far away, and the normal there."""

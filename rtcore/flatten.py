@@ -25,6 +25,7 @@ class Group(NamedTuple):
     has_tree: bool      # False: a handful in one box, or unbounded
     key: tuple          # what it was made from: a group is made anew only when that has changed
     owner: np.ndarray   # int32: the leaf of each of its primitives
+    order: np.ndarray   # int32: where each of them stood before the tree was built: leaf by leaf, in the order of the shape
     dropped: int        # degenerate primitives left out
 
 
@@ -116,7 +117,7 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
     if any(map(len, wild)):
         leaf = leaves[np.concatenate(wild)[0]]
         raise FieldError(f"a placed shape whose numbers fit {np.dtype(dtype).name}", leaf.matrix.tolist(), place(leaf))
-    tree, has_tree = EMPTY_TREE, False
+    tree, has_tree, order = EMPTY_TREE, False, np.arange(len(data), dtype=np.int32)
     if kind.bounds is not None and len(data):
         # bounds of the numbers that the kernel will see: kinds that have exact ones use those
         seen = np.float64 if exact.shape[1] else dtype
@@ -128,4 +129,24 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
             extra = extra[order]
     table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, np.float64 if kind.shared_extra else dtype), side,
                   np.ascontiguousarray(exact))
-    return Group(kind, tree, table, 0, has_tree, key, owner, sum(p.dropped for _, p in packs))
+    return Group(kind, tree, table, 0, has_tree, key, owner, order, sum(p.dropped for _, p in packs))
+
+
+def renumbering(old: Geometry, new: Geometry, changed: Iterable[int], gone: int) -> np.ndarray:
+    """The new number of each old primitive, int32; `gone` for those of leaves that have changed. The scenes' leaves must be the same
+    otherwise."""
+    number, kept = np.full(len(old.leaf), gone, np.int32), np.ones(len(old.leaves), bool)
+    kept[list(changed)] = False
+    groups = {group.kind: group for group in new.groups}
+    for group in old.groups:
+        now = groups.get(group.kind)
+        if now is None or not len(group.owner):
+            continue
+        place = np.empty(len(now.order), np.int32)
+        place[now.order] = np.arange(len(now.order), dtype=np.int32) + now.first
+        stays = np.flatnonzero(kept[group.owner])
+        # what stays of the old ones stands in the new order as it did, without what came
+        old_rank = np.sort(group.order[stays]).searchsorted(group.order[stays])
+        new_stays = np.sort(now.order[kept[now.owner]])
+        number[group.first + stays] = place[new_stays[old_rank]]
+    return number

@@ -3,7 +3,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-COARSEST = 16       # spacing of the first lattice
+LATTICES = (16, 8, 4, 2, 1)     # their spacings
+COARSEST = LATTICES[0]
 TILE = 64           # lattice points along a tile's edge: 4,096 rays, some milliseconds
 BLOCK = 8           # pixels along the edge of what is traced together
 
@@ -15,17 +16,24 @@ class Pass(NamedTuple):
     skip: bool                          # what the lattice twice as coarse has already
     samples: range
     pixels: np.ndarray | None = None    # int32 (m, 3) as `eye.cast_list` takes them, in `tile_order`
+    coarser: tuple[int, ...] = ()       # spacings of lattices that are traced in the same pass, before its own
+    region: tuple[int, int, int, int] | None = None     # only tiles that have a part of it: x0, y0, x1, y1 in pixels, half open
 
 
-def passes(samples: int, coarse: bool) -> list[Pass]:
-    """The schedule for a number of samples per pixel."""
-    spacing, result = COARSEST if coarse else 1, []
-    while spacing >= 1:
-        result.append(Pass(spacing, coarse and spacing < COARSEST, range(1)))
-        spacing //= 2
-    done = 1
+def passes(coarse: bool, first: int = COARSEST) -> list[Pass]:
+    """The schedule for everybody's first sample: with `coarse` lattice by lattice, those down to the spacing `first` in one pass."""
+    if not coarse:
+        return [Pass(1, False, range(1))]
+    rest = [spacing for spacing in LATTICES if spacing < first]
+    return [Pass(first, first < COARSEST, range(1), coarser=tuple(spacing for spacing in LATTICES if spacing > first)),
+            *(Pass(spacing, True, range(1)) for spacing in rest)]
+
+
+def further(samples: int, region: tuple | None = None) -> list[Pass]:
+    """The schedule from one sample to a number of samples per pixel, all over the picture or where it has a part of a region."""
+    done, result = 1, []
     while done < samples:
-        result.append(Pass(1, False, range(done, min(2 * done, samples))))
+        result.append(Pass(1, False, range(done, min(2 * done, samples)), region=region))
         done = result[-1].samples.stop
     return result
 
@@ -34,24 +42,33 @@ def weight(one: Pass, width: int, height: int) -> float:
     """How much a pass is, in samples of every pixel."""
     if one.pixels is not None:
         return int((one.pixels[:, 2] - one.pixels[:, 1]).sum()) / (width * height)
-    return len(one.samples) * (0.75 if one.skip else 1.0) / one.spacing ** 2
+    if one.region is not None:
+        return len(one.samples) * sum(int(tile[2] * tile[3]) for tile in tiles(one, width, height)) / (width * height)
+    return len(one.samples) * (0.75 if one.skip and not one.coarser else 1.0) / one.spacing ** 2
 
 
-def tiles(one: Pass, width: int, height: int) -> list[np.ndarray]:
-    """What the threads take one after the other: tiles as `eye.cast` takes them, from the middle of the picture outward, or parts of the
-    list that have about as many rays."""
+def tiles(one: Pass, width: int, height: int, edge: int = TILE) -> list[np.ndarray]:
+    """What the threads take one after the other: tiles as `eye.cast` takes them, `edge` lattice points wide, coarse lattices first, each from
+    the middle of the picture outward; or parts of the list that have about as many rays."""
     if one.pixels is not None:
         rays = np.cumsum(one.pixels[:, 2] - one.pixels[:, 1])
-        cuts = np.searchsorted(rays, np.arange(TILE ** 2, rays[-1], TILE ** 2))
+        cuts = np.searchsorted(rays, np.arange(edge ** 2, rays[-1], edge ** 2))
         return [part for part in np.split(one.pixels, cuts) if len(part)]
-    columns, rows = -(-width // one.spacing), -(-height // one.spacing)
-    rest = (one.spacing, one.skip, width, height)
-    return [np.array([x, y, min(TILE, columns - x), min(TILE, rows - y), *rest], np.int64) for x, y in _corners(columns, rows)]
+    result = []
+    for spacing in (*one.coarser, one.spacing):
+        columns, rows = -(-width // spacing), -(-height // spacing)
+        skip = one.skip and spacing < COARSEST
+        result += [np.array([x, y, min(edge, columns - x), min(edge, rows - y), spacing, skip, width, height], np.int64)
+                   for x, y in _corners(columns, rows, edge)]
+    if one.region is not None:
+        x0, y0, x1, y1 = one.region
+        result = [tile for tile in result if tile[0] < x1 and tile[1] < y1 and tile[0] + tile[2] > x0 and tile[1] + tile[3] > y0]
+    return result
 
 
-def _corners(columns: int, rows: int) -> list[tuple[int, int]]:
-    corners = [(x, y) for y in range(0, rows, TILE) for x in range(0, columns, TILE)]
-    return sorted(corners, key=lambda c: (c[0] + TILE / 2 - columns / 2) ** 2 + (c[1] + TILE / 2 - rows / 2) ** 2)
+def _corners(columns: int, rows: int, edge: int = TILE) -> list[tuple[int, int]]:
+    corners = [(x, y) for y in range(0, rows, edge) for x in range(0, columns, edge)]
+    return sorted(corners, key=lambda c: (c[0] + edge / 2 - columns / 2) ** 2 + (c[1] + edge / 2 - rows / 2) ** 2)
 
 
 def tile_order(width: int, height: int) -> np.ndarray:

@@ -32,6 +32,19 @@ class Size(Field):
             raise FieldError("a width and a height from 1 to 16384", value) from None
 
 
+class Region(Field):
+    """A part of a picture."""
+
+    def take(self, value):
+        try:
+            x0, y0, x1, y1 = (Whole(0, 16384, "").take(number) for number in value)
+        except (TypeError, ValueError):
+            x0, y0, x1, y1 = 0, 0, 0, 0
+        if not (x0 < x1 and y0 < y1):
+            raise FieldError("the left, upper, right and lower end in pixels, the latter two not included", value)
+        return x0, y0, x1, y1
+
+
 class Settings(Record, frozen=True, kw_only=True):
     """Settings of one render."""
 
@@ -40,6 +53,7 @@ class Settings(Record, frozen=True, kw_only=True):
     adaptive: Annotated[bool, Flag(help="put them where the error is: `samples` is then the mean over the picture")] = False
     seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after this time")] = None
     error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop at this estimated root mean square error")] = None
+    region: Annotated[tuple[int, int, int, int] | None, Maybe(inner=Region(help="what gets its samples first"))] = None
     precision: Annotated[str, Choice(words=("f64", "f32"), help="of the geometry")] = "f64"
     threads: Annotated[int, Whole(0, 1024, "render threads; 0: one per core")] = 0
     max_depth: Annotated[int, Whole(1, 64, "longest chain of rays, the eye's included")] = 5

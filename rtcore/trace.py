@@ -8,7 +8,9 @@ import numpy as np
 
 from rtcore import film as films, fog as fogs, shading
 from rtcore.eye import cast, cast_list
+from rtcore.edits import shadow_key
 from rtcore.flatten import Geometry, nbytes
+from rtcore.keep import Memory, Recall
 from rtcore.lanes import LANES
 from rtcore.lens import bend
 from rtcore.lights import SAMPLED, SHINE, Draw
@@ -17,7 +19,7 @@ from rtcore.scene import Background, Fog
 from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
-from rtcore.wave import NO_ANSWER, Wave, new_beam, new_wave, padded
+from rtcore.wave import NO_ANSWER, Beam, Wave, new_beam, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
 SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
@@ -35,6 +37,7 @@ class Lamp(NamedTuple):
     numbers: np.ndarray
     color: np.ndarray
     sampled: bool           # it has an extent
+    key: tuple              # what its shadows depend on
 
 
 class Clock:
@@ -68,6 +71,12 @@ class Scratch:
         self.target = self.number = np.zeros(0, np.int32)
         self.sample = np.zeros((3, 0), np.float32)
 
+    def renew(self) -> None:
+        """Count from nothing, for another picture."""
+        self.counts, self.clock, self.tallied = np.zeros(len(COUNTS), np.int64), Clock(), np.zeros(2, np.int64)
+        for rays in (self.beam.rays, *(wave.rays for wave in self.waves)):
+            rays.tally[:] = 0
+
     def wave(self, level: int, n: int) -> Wave:
         """The wave of a bounce, with room for n rays."""
         while len(self.waves) <= level:
@@ -100,6 +109,13 @@ class Scratch:
         return self.beam
 
 
+class First(NamedTuple):
+    """What goes along with a wave of first samples."""
+
+    film: films.Film            # notes which lights reach the hits, if it has room for that
+    recall: Recall | None       # what is known of this tile from before
+
+
 class Tracer:
     """Traces tiles of one scene from one camera. Holds nothing that changes, so threads may share it."""
 
@@ -108,19 +124,29 @@ class Tracer:
         self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
         self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity),
-                           isinstance(light, SAMPLED)) for light in plan.lights]
+                           isinstance(light, SAMPLED), shadow_key(light)) for light in plan.lights]
         self.numbered = lens is not None or any(lamp.sampled for lamp in self.lamps)    # something asks which sample a ray belongs to
         self.fog = fogs.numbers(fog) if plan.fog else None
 
-    def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool]) -> bool:
+    def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool],
+             memory: Memory | None = None) -> bool:
         """Trace one sample of a tile (see `eye.cast`) onto the film, unless it is there already; False if it was given up half way, the
-        film then as before."""
+        film then as before. With a memory, what first samples have met is taken from there and kept there."""
         wave = scratch.primary(int(tile[2] * tile[3]))
         scratch.clock.start()
         n = cast(wave, scratch.target, self.view, tile, sample, self.settings.seed)
         if self.numbered:
             scratch.number[:n] = sample
-        return n == 0 or film.count[scratch.target[0]] > sample or self._trace(scratch, film, wave, n, sample == 0, stale)
+        if n == 0 or film.count[scratch.target[0]] > sample:
+            return True
+        if sample > 0:
+            return self._trace(scratch, film, wave, n, stale)
+        recall = None if memory is None else memory.recall(tile)
+        if not self._trace(scratch, film, wave, n, stale, First(film, recall)):
+            return False
+        if recall is not None:
+            memory.keep(tile, recall)
+        return True
 
     def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
         """The same for further samples of a list of pixels (see `eye.cast_list`)."""
@@ -132,19 +158,20 @@ class Tracer:
         n = cast_list(wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)
         if self.numbered:
             scratch.number[:n] = np.arange(n) - np.repeat(np.cumsum(each) - pixels[:, 2], each)
-        return self._trace(scratch, film, wave, n, False, stale)
+        return self._trace(scratch, film, wave, n, stale)
 
-    def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, first: bool, stale: Callable[[], bool]) -> bool:
+    def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, stale: Callable[[], bool], first: First | None = None) -> bool:
         """Follow a wave of primary rays and add what it brings to the film; note what it hits if it holds its pixels' first samples."""
         counts, clock = np.zeros_like(scratch.counts), scratch.clock
         scratch.sample[:, :n] = 0
         clock.lap("primary rays", "core")
-        if self.lens is not None and not first:     # a first sample goes through the middle
+        if self.lens is not None and first is None:     # a first sample goes through the middle
             bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
             clock.lap("depth of field", "lens")
-        self.hit(clock, wave, n)
-        counts[PRIMARY], counts[PRIMARY_HITS] = n, np.count_nonzero(wave.rays.prim[:n] >= 0)
-        if first:
+        counts[PRIMARY], counts[PRIMARY_HITS] = n, 0
+        self.hit(clock, wave, n, counts, first)
+        counts[PRIMARY_HITS] += np.count_nonzero(wave.rays.prim[:n] >= 0)
+        if first is not None:
             films.note_first_hits(film, wave, n, scratch.target)
             if len(film.lit):       # what a tile that was given up has noted does not count
                 film.lit[scratch.target[:n]] = 0
@@ -152,22 +179,20 @@ class Tracer:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
             clock.lap("film", "core")
-        noting = film if first and len(film.lit) else None
-        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, noting):
+        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, first):
             return False
         counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
         clock.lap("film", "core")
         scratch.counts += counts
         return True
 
-    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale, noting: films.Film | None) -> bool:
-        """Light a wave that has hit, and all that comes of it, level by level; False if stale. noting: the film, if it is to note which
-        lights reach the first hits."""
+    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale, first: First | None) -> bool:
+        """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
         clock = scratch.clock
         for depth in range(1, self.settings.max_depth + 1):
             if depth > 1:
-                self.hit(clock, wave, n)
-            self._light(scratch, wave, n, depth, counts, noting if depth == 1 else None)
+                self.hit(clock, wave, n, counts, first)
+            self._light(scratch, wave, n, depth, counts, first)
             if self.fog is not None:
                 fogs.dim(wave, n, self.fog)
                 clock.lap("fog", "fog")
@@ -184,16 +209,31 @@ class Tracer:
                 return True
         return True
 
-    def hit(self, clock: Clock, wave: Wave, n: int) -> None:
-        """Nearest hits and their surfaces."""
-        for group in self.geometry.groups:
+    def hit(self, clock: Clock, wave: Wave, n: int, counts: np.ndarray, first: First | None) -> None:
+        """Nearest hits and their surfaces. Rays of which they are known are not traced, nor counted."""
+        recall, known, spared = first and first.recall, 0, ("primary rays", "core")     # looking up counts to what it spares
+        if recall is not None:
+            primary = not recall.levels
+            known, hits, reflected, refracted = recall.hits(wave, n)
+            if primary:
+                counts[PRIMARY] -= known
+                counts[PRIMARY_HITS] -= hits
+            else:
+                counts[REFLECTION] -= reflected
+                counts[REFRACTION] -= refracted
+                spared = "reflected and refracted rays", "bounce"
+            clock.lap(*spared)
+        for group in self.geometry.groups if known < n else ():
             group.kind.intersect(wave.rays, n, group.tree, group.table, group.first, CLOSEST)
             clock.lap(f"hits: {group.kind.name}", group.kind.name)
+        if recall is not None:
+            recall.note_hits(wave, n)
+            clock.lap(*spared)
         for group in self.geometry.groups:
             group.kind.surface(wave.rays, n, wave.surface, group.table, group.first)
             clock.lap("surface at the hits", group.kind.name)
 
-    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, noting: films.Film | None) -> None:
+    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, first: First | None) -> None:
         clock = scratch.clock
         if not self.lamps:
             shading.glow(wave, n, self.look, NO_ANSWER)
@@ -205,19 +245,37 @@ class Tracer:
         clock.lap(GLOW, "glow")
         pairs = LIGHTS + depth * len(self.lamps)
         for k in range(0, len(self.lamps), together):
-            m, lamps = 0, self.lamps[k:k + together]
+            m, lamps, ends = 0, self.lamps[k:k + together], [0]
             for j, lamp in enumerate(lamps, k):
                 draw = (Draw(scratch.target, scratch.number, pairs + j, self.settings.seed),) if lamp.sampled else ()
                 m = lamp.shine(wave, n, lamp.numbers, lamp.color, beam, m, *draw)
+                ends.append(m)
                 clock.lap(f"light: {lamp.name}", f"light-{lamp.name}")
             if m == 0:
                 continue
             if self.plan.shadows:
-                for group in self.geometry.groups:
-                    group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
-                    clock.lap("shadow rays", group.kind.name)
-                counts[SHADOW] += m
-            if noting is not None:
-                films.note_lit(noting, beam, m, scratch.target, np.float32(1 / len(self.lamps)))
+                known, blocked = self._shadows(clock, beam, [(lamp.key, *ends[j:j + 2]) for j, lamp in enumerate(lamps)],
+                                               first and first.recall)
+                counts[SHADOW] += m - known
+                counts[SHADOW_HITS] -= blocked
+            if first is not None and depth == 1 and len(first.film.lit):
+                films.note_lit(first.film, beam, m, scratch.target, np.float32(1 / len(self.lamps)))
             counts[SHADOW_HITS] += shading.gather(wave, beam, m)
             clock.lap(f"light: {lamps[0].name}", "lit")
+
+    def _shadows(self, clock: Clock, beam: Beam, parts: list[tuple], recall: Recall | None) -> tuple[int, int]:
+        """What is in the way of a beam's rays, those of each light being a part (key, first column, one past the last). Returns of how many
+        it was known, and how many of these reach no light."""
+        m, known, blocked = parts[-1][2], 0, 0
+        if recall is not None:
+            known = m - sum(recall.shadows(beam, *part) for part in parts)
+            blocked = int(np.count_nonzero(beam.rays.prim[:m] >= 0))
+            clock.lap("shadow rays", "lit")
+        for group in self.geometry.groups if known < m else ():
+            group.kind.intersect(beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
+            clock.lap("shadow rays", group.kind.name)
+        if recall is not None and known < m:
+            for part in parts:
+                recall.note_shadows(beam, *part)
+            clock.lap("shadow rays", "lit")
+        return known, blocked

@@ -12,6 +12,7 @@ import numpy as np
 from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, recast, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
+from rtcore.keep import Memory, Recall
 from rtcore.lights import SAMPLED, SHINE, Draw
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
@@ -101,6 +102,21 @@ def _lit(dtype):
     films.note_lit(films.new_film(8, 8, lit=True), beam, 0, np.empty(0, np.int32), np.float32(1))
 
 
+def _keep(dtype):
+    wave, _, n = _wave(dtype)
+    beam, recall, boxes = new_beam(n, 1, dtype), Recall([]), np.zeros((1, 6))
+    recall.hits(wave, n)
+    recall.note_hits(wave, n)
+    recall.note_shadows(beam, (), 0, 0)
+    memory = Memory()
+    memory.tiles[b""] = recall.kept()
+    memory.renumber(np.ones(0, np.int32), True, boxes)
+    again = Recall(memory.tiles[b""])
+    again.hits(wave, n)
+    again.note_hits(wave, n)
+    again.shadows(beam, (), 0, 0)
+
+
 def _fog(dtype):
     wave, _, n = _wave(dtype)
     fogs.dim(wave, n, fogs.numbers(Fog()))
@@ -135,6 +151,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
+    "keep": ("rtcore.keep", _keep),
     "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
@@ -149,7 +166,8 @@ def _marker(name: str):
 def missing(scene: Scene, settings: Settings, screen: bool = False, camera: Camera | None = None) -> list[str]:
     """Names of the kernel groups that this render needs and the cache lacks, and its way to the screen if wanted; from the scene's camera
     if none is given. Compiles nothing."""
-    names = (*plan(scene, settings, camera=camera).kernels, *([f"screen.{settings.precision}"] if screen else []))
+    groups = ("screen", "keep") if screen else ()
+    names = (*plan(scene, settings, camera=camera).kernels, *(f"{group}.{settings.precision}" for group in groups))
     return [name for name in names if not _marker(name).exists()]
 
 

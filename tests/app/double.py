@@ -51,7 +51,7 @@ class Double:
         names, self.names = self.names, []
         return names
 
-    def frames(self, job: Job, cancelled: Callable[[], bool]) -> Iterator[Frame]:
+    def frames(self, job: Job, cancelled: Callable[[], bool], dragged: bool) -> Iterator[Frame]:
         started = time.monotonic()
         for number, spacing in enumerate(self.spacings):
             end = time.monotonic() + self.pause

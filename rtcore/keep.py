@@ -1,0 +1,262 @@
+"""What the first samples of a picture met, kept for the next one: hits of the eye's rays and of those that come of them, and how far light
+reaches each hit.
+
+A tile's waves are kept level by level, a column a ray. A ray of the first level is known by its column, for a tile's rays are always cast
+in the same order; one of a later level by the ray it comes from and the way it went (`Wave.source`). So when materials, lights or fog have
+changed, the tile goes through the same stages as ever, and where a ray is known, what it meets is looked up and not traced. What an edit
+leaves valid is said in `rtcore.edits`.
+
+Twelve bytes a ray (eight with float32) and four for each light that shone on it.
+"""
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from rtcore.jit import inline, kernel
+from rtcore.wave import DEAD, DX, OPAQUE, OX, START, T, Beam, Wave
+
+UNKNOWN = -2            # in place of a primitive: to be traced again
+UNSEEN = -1             # in place of an optical depth: no shadow ray is known
+BOXES = 64              # that may have been added before what is kept is given up
+NO_BOXES = np.zeros((0, 6))
+MOST = 1 << 30          # bytes; further tiles are not kept
+
+
+class Shade(NamedTuple):
+    """How far one light reaches the hits of a wave."""
+
+    depth: np.ndarray       # int32 (n): optical depth on the way, OPAQUE + the primitive that is in the way, or UNSEEN
+    boxes: np.ndarray       # (m, 6): low and high corners of what came into the scene since
+
+
+class Level:
+    """One wave of a tile."""
+
+    def __init__(self, source: np.ndarray, prim: np.ndarray, t: np.ndarray, doubt: np.ndarray):
+        self.source, self.prim, self.t, self.doubt = source, prim, t, doubt
+        self.boxes = NO_BOXES
+        self.whole = True                           # no hit is UNKNOWN
+        self.shades: dict[tuple, Shade] = {}        # by what makes a light's shadows
+
+    @property
+    def nbytes(self) -> int:
+        return sum(a.nbytes for a in (self.source, self.prim, self.t, self.doubt, *(s.depth for s in self.shades.values())))
+
+
+class Known(NamedTuple):
+    """How many rays of a wave needed no tracing: all, those that hit something, those reflected and those refracted."""
+
+    rays: int
+    hits: int
+    reflected: int
+    refracted: int
+
+
+@inline
+def _near(ray, i, far, boxes):
+    """Whether ray i comes into one of the boxes before `far`."""
+    for b in range(boxes.shape[0]):
+        enter, leave = 0.0, np.float64(far)
+        for k in range(3):
+            o, d = np.float64(ray[OX + k, i]), np.float64(ray[DX + k, i])
+            if d == 0:
+                if o < boxes[b, k] or o > boxes[b, k + 3]:
+                    leave = -1.0
+                continue
+            p, q = (boxes[b, k] - o) / d, (boxes[b, k + 3] - o) / d
+            enter, leave = max(enter, min(p, q)), min(leave, max(p, q))
+        if enter <= leave:
+            return True
+    return False
+
+
+@kernel
+def _recall(rays, was, prim, t, doubt, source, boxes, known):
+    """Give rays their known hits and let them be dead to the intersection kernels; `was`, a ray's column then, becomes -1 where nothing is
+    known. known: `Known`."""
+    for i in range(len(was)):
+        old = was[i]
+        if old < 0 or prim[old] == UNKNOWN or _near(rays.ray, i, t[old], boxes):
+            was[i] = -1
+            continue
+        rays.prim[i], rays.ray[T, i], rays.ray[START, i] = prim[old], t[old], t[old]
+        rays.doubt[i] = doubt[old]
+        known[0] += 1
+        known[1] += prim[old] >= 0
+        known[2 + source[old] % 2] += 1
+
+
+@kernel
+def _recall_shadows(beam, first, last, depth, boxes):
+    """Columns first .. last - 1 of the beam get their known depths and are dead to the intersection kernels; returns how many are not
+    known."""
+    missing = 0
+    for j in range(first, last):
+        seen = depth[beam.owner[j]]
+        if seen == UNSEEN or seen < OPAQUE and _near(beam.rays.ray, j, beam.rays.ray[T, j], boxes):
+            missing += 1
+            continue
+        beam.rays.prim[j], beam.rays.depth[j] = (seen - OPAQUE, 0) if seen >= OPAQUE else (-1, seen)
+        beam.rays.ray[T, j] = DEAD
+    return missing
+
+
+@kernel
+def _note_shadows(beam, first, last, depth):
+    """Keep what columns first .. last - 1 of the beam met."""
+    for j in range(first, last):
+        p = beam.rays.prim[j]
+        depth[beam.owner[j]] = beam.rays.depth[j] if p < 0 else OPAQUE + p
+
+
+@kernel
+def _renumber(prim, number):
+    """Primitives by their new numbers, UNKNOWN for those that are gone; returns whether there are such."""
+    gone = False
+    for i in range(len(prim)):
+        if prim[i] >= 0:
+            prim[i] = number[prim[i]]
+            gone |= prim[i] == UNKNOWN
+    return gone
+
+
+@kernel
+def _renumber_shade(depth, number, through):
+    """The same for what is in the light's way; with `through` also what only dims it may be gone."""
+    for i in range(len(depth)):
+        if depth[i] >= OPAQUE:
+            p = number[depth[i] - OPAQUE]
+            depth[i] = UNSEEN if p == UNKNOWN else OPAQUE + p
+        elif through and depth[i] > 0:
+            depth[i] = UNSEEN
+
+
+class Memory:
+    """What is kept of one picture, by tile. Threads may use it at once, each for tiles of its own."""
+
+    def __init__(self):
+        self.tiles: dict[bytes, list[Level]] = {}
+        self._nbytes: dict[bytes, int] = {}
+
+    @property
+    def nbytes(self) -> int:
+        return sum(self._nbytes.values())
+
+    def recall(self, tile: np.ndarray) -> "Recall":
+        """For tracing a tile again."""
+        return Recall(self.tiles.get(tile.tobytes(), []))
+
+    def keep(self, tile: np.ndarray, recall: "Recall") -> None:
+        """What was met on a tile now."""
+        key, levels = tile.tobytes(), recall.kept()
+        size = sum(level.nbytes for level in levels)
+        if key in self.tiles or self.nbytes + size <= MOST:
+            self.tiles[key], self._nbytes[key] = levels, size
+
+    def covers(self, tiles: Iterable[np.ndarray]) -> bool:
+        """Whether something is kept of all these tiles."""
+        return all(tile.tobytes() in self.tiles for tile in tiles)
+
+    def forget_onward(self) -> None:
+        """Drop what reflected and refracted rays met."""
+        for levels in self.tiles.values():
+            del levels[1:]
+
+    def forget_shadows(self, but: frozenset = frozenset()) -> None:
+        """Drop what lights shine on, but for those named."""
+        for levels in self.tiles.values():
+            for level in levels:
+                level.shades = {key: shade for key, shade in level.shades.items() if key in but}
+
+    def renumber(self, number: np.ndarray, through: bool, boxes: np.ndarray) -> bool:
+        """Shapes went and came. number: int32, the new number of each primitive, or UNKNOWN; `through`: something that went let light
+        through; boxes (m, 6): around what came. False if so much has come that nothing is kept."""
+        moved = (number != np.arange(len(number))).any()
+        for levels in self.tiles.values():
+            for level in levels:
+                if moved and _renumber(level.prim, number):
+                    level.whole = False
+                level.boxes = np.concatenate([level.boxes, boxes])
+                if len(level.boxes) > BOXES:
+                    self.tiles.clear()
+                    self._nbytes.clear()
+                    return False
+                for key, (depth, since) in level.shades.items():
+                    if moved or through:
+                        _renumber_shade(depth, number, through)
+                    level.shades[key] = Shade(depth, np.concatenate([since, boxes]))
+        return True
+
+
+class Recall:
+    """One tile, traced again: hands out what is known of each wave, and collects what is to be kept."""
+
+    def __init__(self, kept: list[Level]):
+        self._kept = kept
+        self.levels: list[Level] = []
+        self._was: np.ndarray | None = None     # the kept column of each ray of the wave at hand, -1 unknown; None: its own
+
+    def hits(self, wave: Wave, n: int) -> Known:
+        """Give the rays of the next wave the hits that are known."""
+        depth = len(self.levels)
+        old, source = self._kept[depth] if depth < len(self._kept) else None, wave.source[:n]
+        if old is None:
+            self._was = np.full(n, -1, np.int32)
+        elif depth > 0:
+            self._was = self._matched(old, source)
+        if self._was is None and old.whole and not len(old.boxes):
+            rays, refracted = wave.rays, int(np.count_nonzero(old.source & 1))
+            rays.ray[T, :n], rays.prim[:n], rays.doubt[:n] = old.t, old.prim, old.doubt
+            return Known(n, int(np.count_nonzero(old.prim >= 0)), n - refracted, refracted)
+        known = np.zeros(4, np.int64)
+        if old is not None:
+            self._was = np.arange(n, dtype=np.int32) if self._was is None else self._was
+            _recall(wave.rays, self._was, old.prim, old.t, old.doubt, old.source, old.boxes, known)
+        return Known(*map(int, known))
+
+    def _matched(self, old: Level, source: np.ndarray) -> np.ndarray | None:
+        """The kept columns of rays that come from those of the wave before."""
+        if self._was is None:
+            if np.array_equal(source, old.source):
+                return None
+            wanted = source
+        else:
+            parent = self._was[source >> 1]
+            wanted = np.where(parent < 0, -1, 2 * parent + (source & 1)).astype(np.int32)
+        if len(old.source) == 0:
+            return np.full(len(source), -1, np.int32)
+        at = np.minimum(np.searchsorted(old.source, wanted), len(old.source) - 1)
+        return np.where(old.source[at] == wanted, at, -1).astype(np.int32)
+
+    def note_hits(self, wave: Wave, n: int) -> None:
+        """The wave has met what it meets."""
+        rays, depth = wave.rays, len(self.levels)
+        if self._was is None:       # all of it was known
+            self.levels.append(self._kept[depth])
+            return
+        level = Level(np.zeros(n, np.int32) if depth == 0 else wave.source[:n].copy(), rays.prim[:n].copy(), rays.ray[T, :n].copy(),
+                      rays.doubt[:n].copy())
+        if depth < len(self._kept):
+            for key, (kept, boxes) in self._kept[depth].shades.items():
+                level.shades[key] = Shade(np.where(self._was < 0, UNSEEN, kept[self._was]), boxes)
+        self.levels.append(level)
+
+    def kept(self) -> list[Level]:
+        """All that is known of the tile now; of waves that were not wanted this time, what was known before."""
+        return self.levels + (self._kept[len(self.levels):] if self._was is None else [])
+
+    def shadows(self, beam: Beam, key: tuple, first: int, last: int) -> int:
+        """Give one light's rays, columns first .. last - 1, what is known of their way; returns how many have to be traced."""
+        shade = self.levels[-1].shades.get(key)
+        if shade is None:
+            return last - first
+        return _recall_shadows(beam, first, last, shade.depth, shade.boxes)
+
+    def note_shadows(self, beam: Beam, key: tuple, first: int, last: int) -> None:
+        """They have met what they meet."""
+        level = self.levels[-1]
+        shade = level.shades.get(key)
+        if shade is None or len(shade.boxes):       # of other columns it is not known what the new boxes do
+            shade = level.shades[key] = Shade(np.full(len(level.prim), UNSEEN, np.int32), NO_BOXES)
+        _note_shadows(beam, first, last, shade.depth)

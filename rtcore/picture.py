@@ -1,0 +1,285 @@
+"""One picture under way: from a request to its frames."""
+import itertools
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from rtcore import adaptive, film as films
+from rtcore.camera import Camera
+from rtcore.flatten import Geometry, nbytes
+from rtcore.keep import Memory
+from rtcore.pace import Pace
+from rtcore.plan import VIEW, Plan
+from rtcore.recast import Recast
+from rtcore.scene import Scene
+from rtcore.schedule import COARSEST, Pass, further, passes, tile_order, tiles, weight
+from rtcore.settings import Settings
+from rtcore.trace import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW, Scratch, Tracer
+from rtcore.views.view import Seen
+
+PARTIAL = 0.25      # seconds after which a long pass shows what it has
+SHOWN = 2.0         # how much longer it takes until a frame is on the screen than until it is made
+
+
+class RenderRequest(NamedTuple):
+    """What to render."""
+
+    scene: Scene
+    camera: Camera
+    settings: Settings
+
+
+class Frame(NamedTuple):
+    """The picture after a pass, or within a long one."""
+
+    number: int             # of the pass, from 0
+    passes: int             # planned in all
+    spacing: int            # of the lattice: 16, 8, 4, 2; 1 from then on
+    samples: int            # of every pixel, complete; 0 while the lattice is coarse
+    pixels: np.ndarray      # float32 (h, w, 3), linear; the frame's own
+    node: np.ndarray        # int32 (h, w): leaf first hit, -1 none
+    distance: np.ndarray    # float32 (h, w): from the eye, inf none
+    rays: dict[str, int]
+    elapsed: float          # seconds of tracing
+    done: bool
+    plan: Plan
+    seconds: dict[tuple[str, str], float]   # where they went, all threads together: by (stage of the plan, kernel group)
+    mean: float             # samples per pixel over the whole picture
+    error: float | None     # estimated root mean square error, in linear light; None below two samples
+    converged: bool         # it ended because no error is left that could be seen
+    held: dict[str, int]    # bytes, by what for
+
+
+class Start(NamedTuple):
+    """What a picture begins with."""
+
+    before: "Render | None"     # the last one, whose arrays are used again: it can't go on then
+    edits: frozenset[str]       # how it differs from that, names of `edits.EDITS`; empty if nothing of it holds
+    memory: Memory | None       # what is known of its first samples
+    coarse: bool                # lattice by lattice
+    first: int                  # spacing of the finest one in the first pass
+    edge: int                   # of the tiles
+    soon: float                 # seconds after which the first pass shows what it has
+    goes_on: bool               # the samples of the one before are its own
+    threads: int
+
+
+class Render:
+    """One request under way: its film, its scratch arrays, how far it is."""
+
+    def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, start: Start):
+        scene, camera, self.settings = self.request = request
+        before, self.edits, self.memory, coarse, first, self.edge, self.soon, goes_on, threads = start
+        self.plan, self.pace = composed, pace
+        self.finished = False   # the pass
+        self.done = False
+        self.dropped = geometry.dropped
+        width, height = size = self.settings.size
+        view = camera.rays(width, height)
+        lens = camera.lens() if self.plan.lens else None
+        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
+        # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
+        lit = coarse or VIEW[self.settings.view].needs_lit
+        reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit)
+        self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit)
+        if reused and not goes_on:
+            films.clear(self.film)
+        if before is not None and len(before.scratches) == threads and before.tracer.geometry.dtype == geometry.dtype:
+            self.scratches = before.scratches
+            for scratch in self.scratches if not goes_on else ():
+                scratch.renew()
+        else:
+            self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
+        self.recast = Recast(geometry, view, width, height)
+        self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
+        self.regions = [self.settings.region, None] if self.settings.region else [None]     # to be refined, one after the other
+        self.schedule = [*passes(coarse, first), *self._further()]
+        numbers: dict[int, int] = {}
+        self.materials = np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in geometry.leaves], np.int32)
+        self.order: np.ndarray | None = None
+        self.spent = 0.0        # samples per pixel of whole passes
+        self.converged = False  # nothing is left that could be seen
+        self.prepared = time.perf_counter() - (before.elapsed if goes_on else 0.0)
+        self.number = 0         # of the pass
+        self.samples = 0        # per pixel, complete
+        self.elapsed = 0.0
+        self.done_tiles = itertools.count(1)
+        self.progress = 0.0
+        self.pool: ThreadPoolExecutor | None = None
+
+    def answers(self, request: RenderRequest, keep: bool) -> bool:
+        """Whether what is under way is what another request wants too, at most seen differently. The very same request is answered by
+        going on with it, and once it is done, by doing it again, unless it is kept."""
+        scene, camera, settings = request
+        mine = self.request.settings
+        if scene is not self.request.scene or camera != self.request.camera:
+            return False
+        if msgspec.structs.replace(settings, view=mine.view, seconds=mine.seconds) != mine:
+            return False
+        if VIEW[settings.view].needs_light and not VIEW[mine.view].needs_light:
+            return False        # no light was traced
+        if VIEW[settings.view].needs_lit and not len(self.film.lit):
+            return False
+        return keep or not self.done or settings.view != self.settings.view
+
+    def look(self, request: RenderRequest, now: float) -> None:
+        """Go on for a request that this one answers, as if it had never stopped."""
+        self.edits = frozenset(name for name, field in (("view", "view"), ("samples", "seconds"))
+                               if getattr(self.settings, field) != getattr(request.settings, field))
+        self.done = self.done and self.finished and "samples" not in self.edits
+        self.settings, self.prepared = request.settings, now - self.elapsed
+
+    def can_go_on(self, request: RenderRequest, composed: Plan) -> bool:
+        """Whether another request, with the same light, can take over the samples so far and come to the very picture that it would come to
+        alone."""
+        if VIEW[request.settings.view].needs_light and not VIEW[self.settings.view].needs_light:
+            return False
+        uniform = adaptive.FIRST if request.settings.adaptive else composed.samples
+        lit = len(self.film.lit) > 0
+        return films.suits(self.film, composed.samples, lit) and int(self.film.count.max()) <= uniform
+
+    def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[None]:
+        """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
+        a thread, ends the threads' work first."""
+        self.pool, one, size = pool, self.schedule[self.number], self.settings.size
+        queue = tiles(one, *size, self.edge)
+        share = weight(one, *size)
+        each = share / max(len(queue), 1)
+        todo, halt = iter(queue), threading.Event()
+        # time runs out only once every pixel has a sample
+        deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
+        self.done_tiles, self.spent = itertools.count(1), float(self.film.count.mean())
+        began, before = time.perf_counter(), self.counts()
+        patience = PARTIAL if self.number else self.soon
+
+        def stale() -> bool:
+            return halt.is_set() or cancelled() or time.perf_counter() > deadline
+
+        shares = [pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
+        try:
+            while wait(shares, patience, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
+                self.elapsed, patience = time.perf_counter() - self.prepared, PARTIAL
+                yield
+        finally:
+            if not all(share.done() for share in shares):
+                halt.set()
+            wait(shares)
+            self.elapsed = time.perf_counter() - self.prepared
+        results = [share.result() for share in shares]      # an exception of a thread comes out here
+        self.finished = all(results)
+        if one.samples == range(1):
+            pixels = (share if self.finished else (next(self.done_tiles) - 1) * each) * size[0] * size[1]
+            self._note_pace(one.spacing, pixels, (time.perf_counter() - began) * len(shares), self.counts() - before)
+        if self.finished:
+            self.spent = float(self.film.count.mean())
+            if one.spacing == 1 and one.pixels is None and one.region is None:
+                self.samples = one.samples.stop
+
+    def _note_pace(self, spacing: int, pixels: float, seconds: float, counts: np.ndarray) -> None:
+        """So many pixels of lattices took so long, and so many rays."""
+        if counts[PRIMARY] >= 0.9 * pixels:
+            self.pace.note(spacing, pixels, seconds)
+        elif not counts[[PRIMARY, SHADOW, REFLECTION, REFRACTION]].any():
+            self.pace.note_known(pixels, seconds)
+
+    def _work(self, scratch: Scratch, one: Pass, todo: Iterator, each: float, stale: Callable[[], bool]) -> bool:
+        """One thread's share of a pass: the next tile as long as there is one; False if it became stale."""
+        for tile in todo:
+            if one.pixels is not None and (stale() or not self.tracer.listed(scratch, self.film, tile, stale)):
+                return False
+            for sample in one.samples:
+                if stale() or not self.tracer.tile(scratch, self.film, tile, sample, stale, self.memory):
+                    return False
+            self.progress = min((self.spent + next(self.done_tiles) * each) / self.plan.samples, 1.0)
+        return True
+
+    def error(self) -> float | None:
+        """The estimated root mean square error, over pixels and channels; None below two samples."""
+        if min(self.plan.samples, self.samples) < 2:
+            return None
+        uneven = self.adaptive and self.samples >= adaptive.FIRST
+        return adaptive.rmse_estimate(self.film, *self.settings.size) if uneven else films.rmse_estimate(self.film)
+
+    def goes_on(self) -> bool:
+        """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
+        target, growth = self.settings.error, adaptive.GROWTH
+        if target is not None:
+            estimate = self.error()
+            if estimate is not None and estimate <= target:
+                return False
+            if estimate is not None:        # no more than is likely to be needed
+                growth = min(max((estimate / target) ** (2 / adaptive.POWER) - 1, growth / 8), growth)
+        while self.number + 1 == len(self.schedule):
+            one = self._refinement(growth, target or adaptive.CONVERGED) if self.adaptive else None
+            self.converged = one is not None and len(one.pixels) == 0
+            if one is not None and len(one.pixels):
+                self.schedule.append(one)
+            elif len(self.regions) > 1:
+                del self.regions[0]
+                self.schedule += self._further()
+            else:
+                return False
+        return True
+
+    def _further(self) -> list[Pass]:
+        """The passes that bring the region at hand to its number of samples, or to what adaptive ones begin with."""
+        return further(adaptive.FIRST if self.adaptive else self.plan.samples, self.regions[0])
+
+    def _refinement(self, growth: float, target: float) -> Pass | None:
+        """The next adaptive pass, over what is to be refined now."""
+        size, inside = self.settings.size, None
+        if self.order is None:
+            self.order = tile_order(*size)
+        if self.regions[0]:
+            x0, y0, x1, y1 = self.regions[0]
+            inside = np.zeros(size[::-1], bool)
+            inside[y0:y1, x0:x1] = True
+        return adaptive.refinement(self.film, *size, self.order, self.plan.samples, growth, min(adaptive.CONVERGED, target),
+                                   None if inside is None else inside.ravel())
+
+    def counts(self) -> np.ndarray:
+        """What all threads have counted so far."""
+        return sum(scratch.counts for scratch in self.scratches)
+
+    def rays(self) -> dict[str, int]:
+        """Counts of rays under the names of the command line's --stats."""
+        counts = dict(zip(COUNTS, (int(c) for c in self.counts())))
+        return {key: counts[key] for key in ("primary", "primary_hits", "shadow", "shadow_hits", "reflection", "refraction")}
+
+    def seconds(self) -> dict[tuple[str, str], float]:
+        """Where the threads' time went so far, by (stage of the plan, kernel group)."""
+        total = Counter()
+        for scratch in self.scratches:
+            total.update(dict(scratch.clock.seconds))       # a copy, for its thread may be adding to it
+        return dict(total)
+
+    def held(self) -> dict[str, int]:
+        """Bytes of the arrays of this render, by what they are for."""
+        groups = self.tracer.geometry.groups
+        return {"shapes": nbytes(group.table for group in groups), "trees": nbytes(group.tree for group in groups if group.has_tree),
+                "waves": sum(scratch.nbytes for scratch in self.scratches), "film": nbytes(self.film),
+                "kept hits": 0 if self.memory is None else self.memory.nbytes}
+
+    def frame(self, done: bool) -> Frame:
+        """The picture as it is now."""
+        began, (width, height) = time.perf_counter(), self.settings.size
+        pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
+        node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
+        films.develop(self.film, width, height, COARSEST, pixels)
+        films.fill(self.film, self.tracer.geometry.leaf, width, height, COARSEST, node, distance, normal, doubt)
+        shown = VIEW[self.settings.view].draw(Seen(
+            pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width),
+            error=lambda: np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width),
+            lit=lambda: self.recast.spread(self.film, self.film.lit, COARSEST),
+            coordinates=lambda: self.recast.spread(self.film, self.recast.coordinates(self.film), COARSEST),
+            tests=lambda: self.recast.spread(self.film, self.recast.tests(self.film), COARSEST)))
+        self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
+        return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
+                     self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),
+                     self.converged, self.held())
