@@ -50,7 +50,8 @@ EDIT = {edit.name: edit for edit in EDITS}
 
 #: Fields of the settings, by the edit that a change of them is.
 SETTINGS = {"view": "view", "samples": "samples", "adaptive": "samples", "seconds": "samples", "error": "samples", "threads": "samples",
-            "region": "samples", "filter": "lens", "fog": "fog", "shadows": "shadows", "reflections": "reflections", "max_depth": "reflections"}
+            "region": "samples", "filter": "lens", "fog": "fog", "shadows": "shadows", "reflections": "reflections",
+            "max_depth": "reflections"}
 
 
 class Change(NamedTuple):

@@ -48,8 +48,8 @@ def weight(one: Pass, width: int, height: int) -> float:
 
 
 def tiles(one: Pass, width: int, height: int, edge: int = TILE) -> list[np.ndarray]:
-    """What the threads take one after the other: tiles as `eye.cast` takes them, `edge` lattice points wide, coarse lattices first, each from
-    the middle of the picture outward; or parts of the list that have about as many rays."""
+    """What the threads take one after the other: tiles as `eye.cast` takes them, `edge` lattice points wide, coarse lattices first, each
+    from the middle of the picture outward; or parts of the list that have about as many rays."""
     if one.pixels is not None:
         rays = np.cumsum(one.pixels[:, 2] - one.pixels[:, 1])
         cuts = np.searchsorted(rays, np.arange(edge ** 2, rays[-1], edge ** 2))
