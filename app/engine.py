@@ -52,7 +52,7 @@ class Engine:
 
     def request(self, job: Job) -> "RenderRequest":
         """The renderer's own form of a job."""
-        settings = self._progressive.Settings(size=job.size, **job.options.settings())
+        settings = self._progressive.Settings(size=job.size, region=job.region(), **job.options.settings())
         return self._progressive.RenderRequest(job.scene, job.camera, settings)
 
     def missing(self, job: Job) -> list[str]:
