@@ -17,7 +17,8 @@ GLASS = Material(diffuse=0.1, transmission=0.9, reflection=1.0, fresnel=True, sp
 MIRROR = Material(diffuse=0.3, reflection=0.6, specular=0.4)
 NODES = (
     Node(name="floor", shape=Plane((0, -1, 0), (0, 1, 0)), material=Material(checker=Checker(size=0.7), reflection=0.2)),
-    Node(name="glass", shape=Sphere((-1.5, 0, 0), 0.8), material=GLASS), Node(name="mirror", shape=Sphere((0.3, 0, 1), 0.7), material=MIRROR),
+    Node(name="glass", shape=Sphere((-1.5, 0, 0), 0.8), material=GLASS),
+    Node(name="mirror", shape=Sphere((0.3, 0, 1), 0.7), material=MIRROR),
     Node(name="egg", shape=Sphere((0, 0, 0), 0.5), transform=[Scale((1, 0.4, 2)), Translate((1.6, -0.4, -0.5))]),
     Node(name="box", shape=Box((-0.4, -1, -1.6), (0.3, -0.4, -1)), material=GLASS),
     Node(name="post", shape=Cylinder((1.5, -1, 1.5), (1.5, 0.5, 1.5), 0.4)),
