@@ -169,14 +169,13 @@ def test_more_samples_go_on_from_those_there_are():
 def test_a_region_gets_its_samples_first(adaptive):
     region, settings = (20, 10, 45, 40), Settings(size=(150, 120), samples=32, adaptive=adaptive)
     renderer, x0, y0, x1, y1 = Renderer(keep=True), *region
-    seen, last = [], None
-    for last in renderer.frames(RenderRequest(SCENE, SCENE.camera, replace(settings, region=region))):
-        seen.append(renderer._render.film.count.reshape(120, 150).copy())
+    running = renderer.frames(RenderRequest(SCENE, SCENE.camera, replace(settings, region=region)))
+    frames, seen = zip(*((frame, renderer._render.film.count.reshape(120, 150).copy()) for frame in running))
     ahead = [count for count in seen if count[100:, 100:].max() == 1 and count[y0:y1, x0:x1].min() > 1]
     assert ahead and (ahead[-1][y0:y1, x0:x1].mean() >= 31 if not adaptive else ahead[-1][y0:y1, x0:x1].max() > 8)
     if not adaptive:
-        assert last.pixels.tobytes() == anew(SCENE, SCENE.camera, settings).pixels.tobytes()
-    assert last.done and seen[-1].min() >= 8
+        assert frames[-1].pixels.tobytes() == anew(SCENE, SCENE.camera, settings).pixels.tobytes()
+    assert frames[-1].done and seen[-1].min() >= 8
     renderer.close()
 
 
