@@ -14,6 +14,7 @@ from rtcore.views import VIEWS
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
 FIRST_SAMPLE = "a pixel's first sample goes through the middle of the lens"
+SMOOTH = "no visible material is rough and reflects or transmits"
 GLOW = "background and ambient light"
 
 
@@ -30,6 +31,7 @@ class Plan(NamedTuple):
     bounces: bool
     fog: bool
     lens: bool
+    gloss: bool
     samples: int                    # per pixel
 
 
@@ -82,6 +84,9 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     bounces = _keep(stages, out, "reflected and refracted rays", [
         (lit, NO_LIGHT), (settings.reflections, "switched off"), (settings.max_depth > 1, "the depth is 1: eye rays only"),
         (any(m.reflection > 0 or m.transmission > 0 for m in materials), "no visible material reflects or transmits")])
+    gloss = _keep(stages, out, "glossy reflection", [
+        (lit, NO_LIGHT), (any(m.roughness > 0 and (m.reflection > 0 or m.transmission > 0) for m in materials), SMOOTH),
+        (bounces, "no reflected or refracted rays are followed"), (settings.samples > 1, "a pixel's first sample takes the smooth way")])
     _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1, "one sample per pixel was asked for")])
     stages.append("film")
     kinds = tuple(sorted(counts, key=lambda k: k.name))
@@ -90,13 +95,14 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
               "doubt": any(kind in DOUBTFUL for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds},
-              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces,
+              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss,
               "adaptive": "further samples" in stages and (settings.adaptive or "adaptive" in VIEW[settings.view].kernels),
               "recast": "recast" in VIEW[settings.view].kernels}
     names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, settings.samples if lit else 1)
+    samples = settings.samples if lit else 1
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, samples)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from rtcore.jit import inline
 
 LENS, LIGHTS = 1, 2     # pairs of dimensions: the place on the lens; the first one for places on lights
+GLOSS = 1 << 30         # the first one for the facets of rough surfaces, as many as there are ways that a ray can have come
 REPLICATES = 2      # more would tell the error better and make it larger: edges converge as R^(1/4) N^(-3/4)
 
 

@@ -62,7 +62,8 @@ class Material(Record, frozen=True, kw_only=True):
     """How a surface answers light: the terms of Whitted's model (*An Improved Illumination Model for Shaded Display*, 1980).
 
     Seen light = emission + color·(ambient·Ia + diffuse·Σ I·cos) + highlight·Σ I·cosʰ + reflected and refracted light.
-    With `fresnel`, reflection and transmission are shared out by Fresnel's equations for the index `ior`.
+    With `fresnel`, reflection and transmission are shared out by Fresnel's equations for the index `ior`. With `roughness` the reflected
+    and refracted rays scatter as at facets after the GGX distribution of width roughness² (`rtcore.gloss`).
     """
 
     color: Annotated[Vec, Color(most=1, help="diffuse colour")] = (0.8, 0.8, 0.8)
@@ -72,6 +73,7 @@ class Material(Record, frozen=True, kw_only=True):
     specular: Annotated[float, Number(least=0, help="strength of the highlight (Blinn-Phong)")] = 0.0
     shininess: Annotated[float, Number(above=0, help="exponent of the highlight: the higher, the smaller it is")] = 50.0
     reflection: Annotated[float, Number(least=0, most=1, help="share of the mirror image")] = 0.0
+    roughness: Annotated[float, Number(least=0, most=1, help="blur of mirror image and of what goes through: 0 sharp, 1 all around")] = 0.0
     transmission: Annotated[float, Number(least=0, most=1, help="share of the light that goes through")] = 0.0
     ior: Annotated[float, Number(above=0, help="index of refraction of the inside against the outside")] = 1.5
     fresnel: Annotated[bool, Flag(help="let the angle share the light out between reflection and transmission")] = False

@@ -20,8 +20,8 @@ from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, 
 
 # columns of Look.material
 (COLOR, AMBIENT, DIFFUSE, SPECULAR, SHININESS, REFLECTION, TRANSMISSION, IOR, FRESNEL, TINT, EMISSION, CHECKER, EVEN, ODD,
- SIZE, PATTERN) = 0, 3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 17, 18, 21, 24, 25
-MATERIAL_COLUMNS = 37
+ SIZE, PATTERN, ROUGHNESS) = 0, 3, 4, 5, 6, 7, 8, 9, 10, 11, 14, 17, 18, 21, 24, 25, 37
+MATERIAL_COLUMNS = 38
 
 #: A ray that adds to its pixel less than this share of the light it meets is not followed: for white, a twentieth of the first step above
 #: black in an 8-bit picture.
@@ -34,7 +34,7 @@ REFLECTED, REFRACTED = 0, 1     # sorts of rays that go on
 class Look(NamedTuple):
     """All that shading needs to know."""
 
-    material: np.ndarray    # float64 (m, 37)
+    material: np.ndarray    # float64 (m, 38)
     of: np.ndarray          # int32 (primitives): row of material
     opacity: np.ndarray     # int32 (primitives): optical depth for shadow rays, or OPAQUE
     ambient: np.ndarray     # float64 (3): sum of the ambient lights
@@ -69,6 +69,7 @@ def _row(m: Material, matrix: np.ndarray) -> np.ndarray:
     row[COLOR:COLOR + 3], row[TINT:TINT + 3], row[EMISSION:EMISSION + 3] = m.color, m.tint, m.emission
     row[AMBIENT], row[DIFFUSE], row[SPECULAR], row[SHININESS] = m.ambient, m.diffuse, m.specular, m.shininess
     row[REFLECTION], row[TRANSMISSION], row[IOR], row[FRESNEL] = m.reflection, m.transmission, m.ior, float(m.fresnel)
+    row[ROUGHNESS] = m.roughness
     if m.checker:
         row[CHECKER], row[EVEN:EVEN + 3], row[ODD:ODD + 3], row[SIZE] = 1, m.checker.even, m.checker.odd, m.checker.size
         row[PATTERN:PATTERN + 12] = invertible(matrix)[:3].ravel()

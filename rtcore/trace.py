@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore import film as films, fog as fogs, shading
+from rtcore import film as films, fog as fogs, gloss, shading
 from rtcore.eye import cast, cast_list
 from rtcore.edits import shadow_key
 from rtcore.flatten import Geometry, nbytes
@@ -67,6 +67,7 @@ class Scratch:
         self.clock = Clock()
         self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
         self.waves: list[Wave] = []
+        self.paths: list[np.ndarray] = []           # by level, see `gloss.roughen`
         self.beam = new_beam(0, 0, dtype)
         self.target = self.number = np.zeros(0, np.int32)
         self.sample = np.zeros((3, 0), np.float32)
@@ -86,6 +87,14 @@ class Scratch:
             self.waves[level] = new_wave(n * 5 // 4, self.dtype)
         return self.waves[level]
 
+    def path(self, level: int, n: int) -> np.ndarray:
+        """The ways that n rays of a bounce have come; those of the eye, level 0, are 1."""
+        while len(self.paths) <= level:
+            self.paths.append(np.ones(0, np.int32))
+        if len(self.paths[level]) < n:
+            self.paths[level] = np.ones(n * 5 // 4, np.int32)
+        return self.paths[level]
+
     def primary(self, n: int) -> Wave:
         """The first wave, its pixels, the numbers of its samples and what they bring, with room for n rays."""
         if len(self.target) < n:
@@ -95,7 +104,7 @@ class Scratch:
     @property
     def nbytes(self) -> int:
         """Bytes of all waves and of what belongs to them."""
-        return nbytes((self.waves, self.beam, self.target, self.number, self.sample))
+        return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.sample))
 
     def tally(self) -> np.ndarray:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
@@ -125,7 +134,8 @@ class Tracer:
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
         self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity),
                            isinstance(light, SAMPLED), shadow_key(light)) for light in plan.lights]
-        self.numbered = lens is not None or any(lamp.sampled for lamp in self.lamps)    # something asks which sample a ray belongs to
+        # something asks which sample a ray belongs to
+        self.numbered = lens is not None or plan.gloss or any(lamp.sampled for lamp in self.lamps)
         self.fog = fogs.numbers(fog) if plan.fog else None
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool],
@@ -203,8 +213,13 @@ class Tracer:
             if not self.plan.bounces or depth == self.settings.max_depth:
                 return True
             child = scratch.wave(depth, 2 * n)
-            n, wave = shading.bounce(wave, n, self.look, child, counts), child
+            sent = shading.bounce(wave, n, self.look, child, counts)
             clock.lap("reflected and refracted rays", "bounce")
+            if self.plan.gloss and first is None:       # a first sample goes the smooth way
+                gloss.roughen(wave, child, sent, self.look, scratch.path(depth - 1, n), scratch.path(depth, sent), scratch.target,
+                              scratch.number, self.settings.seed)
+                clock.lap("glossy reflection", "gloss")
+            n, wave = sent, child
             if n == 0:
                 return True
         return True

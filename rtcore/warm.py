@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, fog as fogs, jit, lens, recast, rows, shading
+from rtcore import adaptive, bvh, eye, film as films, fog as fogs, gloss, jit, lens, recast, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.keep import Memory, Recall
@@ -127,6 +127,11 @@ def _bounce(dtype):
     shading.bounce(wave, n, _look(), new_wave(2 * n, dtype), np.zeros(len(COUNTS), np.int64))
 
 
+def _gloss(dtype):
+    wave, target, n = _wave(dtype)
+    gloss.roughen(wave, new_wave(n, dtype), 0, _look(), target, target, target, target, 0)
+
+
 def _light(kind):
     def compile_light(dtype):
         wave, target, n = _wave(dtype)
@@ -151,7 +156,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
-    "keep": ("rtcore.keep", _keep),
+    "keep": ("rtcore.keep", _keep), "gloss": ("rtcore.gloss", _gloss),
     "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},

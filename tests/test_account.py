@@ -57,7 +57,8 @@ def test_sentences():
         "Smooth normals are left out: no mesh brings normals.",
         "Patterns are left out: no visible material has one.",
         "Fog is left out: the scene has none.",
-        "Reflected and refracted rays are left out: no visible material reflects or transmits."]
+        "Reflected and refracted rays are left out: no visible material reflects or transmits.",
+        "Glossy reflection is left out: no visible material is rough and reflects or transmits."]
     dark = sentences(account(plan(Scene(lights=[]), Settings()), {}, {}))
     assert dark[0].startswith(f"It shows no shapes and needs no kernel of the {len(KINDS)} kinds")
     assert "Lights are left out: none shines from a place or direction." in dark

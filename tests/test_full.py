@@ -23,7 +23,7 @@ DARK = (Point(position=(1, 9, 2), intensity=0), Directional(direction=(1, -2, 0.
 def full_plan(scene, settings, leaves=None, camera=None):
     """Everything runs: lights that bring nothing, their shadow rays, fog, bounces."""
     composed = plan(scene, settings, leaves, camera)
-    return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True)
+    return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True, gloss=True)
 
 
 def full_geometry(scene, precision="f64", previous=None) -> Geometry:

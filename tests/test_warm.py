@@ -49,7 +49,7 @@ compile_kernels(ALL)
 before = {name: (tuple(k.signatures), sum(k.stats.cache_misses.values())) for name, k in kernels().items()}
 assert sum(len(signatures) > 0 for signatures, _ in before.values()) > 20, before     # what only kernels call has none if these are cached
 
-glass = Material(diffuse=0.2, reflection=1, transmission=0.8, fresnel=True, checker=Checker())
+glass = Material(diffuse=0.2, reflection=1, roughness=0.3, transmission=0.8, fresnel=True, checker=Checker())
 flat = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)] * 6)
 smooth = Mesh(flat.vertices, flat.faces, normals=[(0, 0, 1)] * 4)
 lights = [Point(position=(0, 9, 0)), Point(position=(1, 9, 0), falloff="constant"), Directional(direction=(1, -1, 0)), Ambient(),

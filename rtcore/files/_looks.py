@@ -31,7 +31,7 @@ def look_of(mesh: Any, suffix: str) -> tuple[str, Material] | None:
 
 
 def _from_mtl(material: Any) -> Material:
-    """Kd, Ks, Ns, Ke, d or Tr, Ni, Tf and illum of a Wavefront material.
+    """Kd, Ks, Ns, Ke, d or Tr, Ni, Tf, illum and, as exporters have added it, Pr (roughness) of a Wavefront material.
 
     illum 3 to 9 ask for ray tracing; of those, 4, 6, 7 and 9 for glass, the others for a mirror of strength Ks.
     """
@@ -45,7 +45,7 @@ def _from_mtl(material: Any) -> Material:
     traced = 3 <= model <= 9
     clear = (1 - alpha if alpha < 1 else _level(raw.get("tf"), 1.0)) if model in (4, 6, 7, 9) else 1 - alpha
     return Material(color=_linear(color), diffuse=_clip(alpha), specular=_clip(shine), shininess=max(_number(raw.get("ns"), 20.0), 1.0),
-                    reflection=_clip(shine) if traced else 0.0, transmission=_clip(clear),
+                    reflection=_clip(shine) if traced else 0.0, roughness=_clip(_number(raw.get("pr"), 0.0)), transmission=_clip(clear),
                     ior=1.5 if clear <= 0 else max(_number(raw.get("ni"), 1.5), 1e-3) if model in (6, 7) else 1.0,
                     emission=tuple(np.maximum(_triple(raw.get("ke"), 0.0), 0).tolist()))
 
@@ -69,8 +69,8 @@ def _from_gltf(material: Any) -> Material:
     clear = _clip(1 - alpha) if material.alphaMode == "BLEND" else 0.0
     return Material(color=color, diffuse=(1 - mirror) * (1 - clear), specular=_clip(0.04 + 0.3 * (1 - rough) + 0.5 * metal * (1 - rough)),
                     shininess=float(np.clip(2 / max(rough, 0.15) ** 4 - 2, 2, 2000)),
-                    reflection=mirror, tint=color if mirror else (1.0, 1.0, 1.0), transmission=clear, ior=1.0 if clear else 1.5,
-                    emission=tuple(np.maximum(emission, 0).tolist()))
+                    reflection=mirror, roughness=rough if mirror else 0.0, tint=color if mirror else (1.0, 1.0, 1.0),
+                    transmission=clear, ior=1.0 if clear else 1.5, emission=tuple(np.maximum(emission, 0).tolist()))
 
 
 def _mean(colors: np.ndarray, linear: bool) -> tuple[float, float, float]:
