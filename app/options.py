@@ -4,7 +4,7 @@ from typing import Annotated
 import msgspec
 
 from rtcore.fields import Choice, FieldError, Flag, Maybe, Number, Numbers, Record
-from rtcore.settings import VIEW_NAMES
+from rtcore.settings import FILTER_NAMES, VIEW_NAMES
 
 MOST_SAMPLES = 1 << 20      # what the renderer is asked for where no end is set
 
@@ -24,6 +24,7 @@ class Options(Record, frozen=True, kw_only=True):
     samples: Annotated[int | None, Maybe(inner=Number(least=1, most=MOST_SAMPLES), help="stop after so many rays through each pixel")] = 16
     seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after so many seconds of tracing")] = None
     error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop once the estimated error is so low (white is 1)")] = None
+    filter: Annotated[str, Choice(words=FILTER_NAMES, help="how what lies about a pixel's centre counts: mitchell is sharpest")] = "box"
     scale: Annotated[float, Number(least=0.1, most=2, help="resolution of the picture against that of the screen")] = 1.0
     max_depth: Annotated[int, Number(least=1, most=64, help="longest chain of rays, the eye's included")] = 5
     threads: Annotated[int, Number(least=0, most=256, help="threads that trace; 0 takes every core")] = 0
@@ -52,4 +53,5 @@ class Options(Record, frozen=True, kw_only=True):
         """The keyword arguments of `rtcore.progressive.Settings`, but for the size."""
         return {"shadows": self.shadows, "fog": self.fog, "reflections": self.reflections, "view": self.view,
                 "adaptive": self.adaptive, "samples": int(self.samples or MOST_SAMPLES), "seconds": self.seconds, "error": self.error,
-                "max_depth": int(self.max_depth), "threads": int(self.threads), "precision": self.precision, "seed": int(self.seed)}
+                "filter": self.filter, "max_depth": int(self.max_depth), "threads": int(self.threads), "precision": self.precision,
+                "seed": int(self.seed)}

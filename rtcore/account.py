@@ -18,10 +18,10 @@ PLURALS = {"box": "boxes", "cone": "cones and cylinders", "torus": "tori", "poly
 #: Lights as an adjective.
 LIGHT_WORDS = {"spherelight": "spherical", "rectanglelight": "rectangular"}
 #: Stages as the end of "it spends a tenth of its time on ...".
-WORDS = {"primary rays": "casting the eye's rays", "depth of field": "the lens", "surface at the hits": "points and normals where they hit",
+WORDS = {"primary rays": "casting the eye's rays", "depth of field": "the lens", "pixel filter": "placing samples by the filter",
+         "surface at the hits": "points and normals where they hit",
          "reflected and refracted rays": "sending reflected and refracted rays on",
-         "glossy reflection": "scattering them at rough surfaces",
-         "film": "adding up the samples"}
+         "glossy reflection": "scattering them at rough surfaces", "film": "adding up the samples"}
 TOLD = 3        # stages that a sentence names
 
 

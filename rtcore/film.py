@@ -30,26 +30,30 @@ class Film(NamedTuple):
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
     doubt: np.ndarray       # uint8 (h·w): not 0 where that hit, or that there is none nearer, has no proof
     lit: np.ndarray         # float32 (h·w): which share of the lights reaches it; length 0 if not wanted
+    # float64 (h·w, 5), where samples have signs, which `total` and `split` contain then (`rtcore.filters`); else length 0: the sums of the
+    # samples without signs, of the signs, and of the first replicate's signs less those of the second's
+    plain: np.ndarray
 
 
-def new_film(width: int, height: int, samples: int = 2, lit: bool = False) -> Film:
-    """An empty film for so many samples per pixel. lit: whether it is to note which lights reach what is hit first."""
+def new_film(width: int, height: int, samples: int = 2, lit: bool = False, signed: bool = False) -> Film:
+    """An empty film for so many samples per pixel. lit: whether it is to note which lights reach what is hit first; signed: whether samples
+    have signs."""
     n = width * height
     m = n if samples > 1 else 0
     # full and not zeros: the system hands the memory out now, not page by page in the midst of tracing, a tenth of whose time that took
     return Film(np.full((n, 3), 0.0), np.full((m, 3), np.float32(0)), np.full(m, 0.0), np.full(n, np.int32(0)), np.full(n, np.int32(-1)),
                 np.full(n, np.float32(np.inf)), np.full((n, 3), np.float32(0)), np.full(n, np.uint8(0)),
-                np.full(n if lit else 0, np.float32(0)))
+                np.full(n if lit else 0, np.float32(0)), np.full((n if signed else 0, 5), 0.0))
 
 
-def suits(film: Film, samples: int, lit: bool) -> bool:
-    """Whether a film of the right size has the arrays for so many samples per pixel, and those for lights if wanted."""
-    return (len(film.square) > 0) == (samples > 1) and (len(film.lit) > 0 or not lit)
+def suits(film: Film, samples: int, lit: bool, signed: bool) -> bool:
+    """Whether a film of the right size has the arrays for so many samples per pixel, for signs or none, and those for lights if wanted."""
+    return (len(film.square) > 0) == (samples > 1) and (len(film.plain) > 0) == signed and (len(film.lit) > 0 or not lit)
 
 
 def clear(film: Film) -> None:
     """Let it be a new film. First hits stay until others are noted: where there is no sample they are not looked at."""
-    for array in (film.total, film.split, film.square, film.count):
+    for array in (film.total, film.split, film.square, film.count, film.plain):
         array.fill(0)
 
 

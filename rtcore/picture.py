@@ -10,7 +10,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from rtcore import adaptive, film as films
+from rtcore import adaptive, film as films, filters
 from rtcore.camera import Camera
 from rtcore.flatten import Geometry, nbytes
 from rtcore.keep import Memory
@@ -86,8 +86,10 @@ class Render:
         self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
         # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
         lit = coarse or VIEW[self.settings.view].needs_lit
-        reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit)
-        self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit)
+        self.gain = self.tracer.filter.gain if self.tracer.filter else 1.0
+        signed = self.gain < 1
+        reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit, signed)
+        self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit, signed)
         if reused and not goes_on:
             films.clear(self.film)
         if before is not None and len(before.scratches) == threads and before.tracer.geometry.dtype == geometry.dtype:
@@ -141,8 +143,8 @@ class Render:
         if VIEW[request.settings.view].needs_light and not VIEW[self.settings.view].needs_light:
             return False
         uniform = adaptive.FIRST if request.settings.adaptive else composed.samples
-        lit = len(self.film.lit) > 0
-        return films.suits(self.film, composed.samples, lit) and int(self.film.count.max()) <= uniform
+        lit, signed = len(self.film.lit) > 0, len(self.film.plain) > 0
+        return films.suits(self.film, composed.samples, lit, signed) and int(self.film.count.max()) <= uniform
 
     def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[None]:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
@@ -204,7 +206,12 @@ class Render:
         if min(self.plan.samples, self.samples) < 2:
             return None
         uneven = self.adaptive and self.samples >= adaptive.FIRST
-        return adaptive.rmse_estimate(self.film, *self.settings.size) if uneven else films.rmse_estimate(self.film)
+        film = self.settled()
+        return adaptive.rmse_estimate(film, *self.settings.size) if uneven else films.rmse_estimate(film)
+
+    def settled(self) -> films.Film:
+        """The film as it is to be read."""
+        return filters.settled(self.film, self.gain)
 
     def goes_on(self) -> bool:
         """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
@@ -240,7 +247,7 @@ class Render:
             x0, y0, x1, y1 = self.regions[0]
             inside = np.zeros(size[::-1], bool)
             inside[y0:y1, x0:x1] = True
-        return adaptive.refinement(self.film, *size, self.order, self.plan.samples, growth, min(adaptive.CONVERGED, target),
+        return adaptive.refinement(self.settled(), *size, self.order, self.plan.samples, growth, min(adaptive.CONVERGED, target),
                                    None if inside is None else inside.ravel())
 
     def counts(self) -> np.ndarray:
@@ -271,11 +278,11 @@ class Render:
         began, (width, height) = time.perf_counter(), self.settings.size
         pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
         node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
-        films.develop(self.film, width, height, COARSEST, pixels)
+        films.develop(self.settled(), width, height, COARSEST, pixels)
         films.fill(self.film, self.tracer.geometry.leaf, width, height, COARSEST, node, distance, normal, doubt)
         shown = VIEW[self.settings.view].draw(Seen(
             pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width),
-            error=lambda: np.sqrt(adaptive.squared_errors(self.film, width, height)).reshape(height, width),
+            error=lambda: np.sqrt(adaptive.squared_errors(self.settled(), width, height)).reshape(height, width),
             lit=lambda: self.recast.spread(self.film, self.film.lit, COARSEST),
             coordinates=lambda: self.recast.spread(self.film, self.recast.coordinates(self.film), COARSEST),
             tests=lambda: self.recast.spread(self.film, self.recast.tests(self.film), COARSEST)))

@@ -14,6 +14,7 @@ from rtcore.views import VIEWS
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
 FIRST_SAMPLE = "a pixel's first sample goes through the middle of the lens"
+CENTRE = "a pixel's first sample is its centre"
 SMOOTH = "no visible material is rough and reflects or transmits"
 GLOW = "background and ambient light"
 
@@ -32,6 +33,7 @@ class Plan(NamedTuple):
     fog: bool
     lens: bool
     gloss: bool
+    filter: bool            # other than a box
     samples: int                    # per pixel
 
 
@@ -47,6 +49,8 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
     stages, out = ["primary rays"], []
     lens = _keep(stages, out, "depth of field", [
         (lit, NO_LIGHT), (camera.aperture > 0, "the camera is a pinhole"), (settings.samples > 1, FIRST_SAMPLE)])
+    shaped = _keep(stages, out, "pixel filter", [
+        (lit, NO_LIGHT), (settings.filter != "box", "with a box, samples lie evenly in their pixel"), (settings.samples > 1, CENTRE)])
     for kind in sorted(KINDS, key=lambda k: k.name):
         if kind not in counts:
             out.append((f"hits: {kind.name}", f"no visible {kind.name} in the scene"))
@@ -95,14 +99,14 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
               "doubt": any(kind in DOUBTFUL for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds},
-              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss,
+              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss, "filter": shaped,
               "adaptive": "further samples" in stages and (settings.adaptive or "adaptive" in VIEW[settings.view].kernels),
               "recast": "recast" in VIEW[settings.view].kernels}
     names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     samples = settings.samples if lit else 1
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, samples)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, samples)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

@@ -5,6 +5,7 @@ from rtcore.fields import Choice, Field, FieldError, Flag, Maybe, Number, Record
 from rtcore.views import VIEWS
 
 VIEW_NAMES = tuple(view.name for view in VIEWS)
+FILTER_NAMES = ("box", "gaussian", "mitchell")
 
 
 class Whole(Field):
@@ -54,6 +55,7 @@ class Settings(Record, frozen=True, kw_only=True):
     seconds: Annotated[float | None, Maybe(inner=Number(above=0), help="stop after this time")] = None
     error: Annotated[float | None, Maybe(inner=Number(above=0), help="stop at this estimated root mean square error")] = None
     region: Annotated[tuple[int, int, int, int] | None, Maybe(inner=Region(help="what gets its samples first"))] = None
+    filter: Annotated[str, Choice(words=FILTER_NAMES, help="how what lies about a pixel's centre counts")] = "box"
     precision: Annotated[str, Choice(words=("f64", "f32"), help="of the geometry")] = "f64"
     threads: Annotated[int, Whole(0, 1024, "render threads; 0: one per core")] = 0
     max_depth: Annotated[int, Whole(1, 64, "longest chain of rays, the eye's included")] = 5

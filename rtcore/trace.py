@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore import film as films, fog as fogs, gloss, shading
+from rtcore import film as films, filters, fog as fogs, gloss, shading
 from rtcore.eye import cast, cast_list
 from rtcore.edits import shadow_key
 from rtcore.flatten import Geometry, nbytes
@@ -70,7 +70,7 @@ class Scratch:
         self.paths: list[np.ndarray] = []           # by level, see `gloss.roughen`
         self.beam = new_beam(0, 0, dtype)
         self.target = self.number = np.zeros(0, np.int32)
-        self.sample = np.zeros((3, 0), np.float32)
+        self.sample, self.signs = np.zeros((3, 0), np.float32), np.zeros(0, np.float32)
 
     def renew(self) -> None:
         """Count from nothing, for another picture."""
@@ -96,15 +96,16 @@ class Scratch:
         return self.paths[level]
 
     def primary(self, n: int) -> Wave:
-        """The first wave, its pixels, the numbers of its samples and what they bring, with room for n rays."""
+        """The first wave, its pixels, the numbers of its samples, what they bring and how they count, with room for n rays."""
         if len(self.target) < n:
             self.target, self.number, self.sample = np.empty(n, np.int32), np.empty(n, np.int32), np.empty((3, n), np.float32)
+            self.signs = np.empty(n, np.float32)
         return self.wave(0, n)
 
     @property
     def nbytes(self) -> int:
         """Bytes of all waves and of what belongs to them."""
-        return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.sample))
+        return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.sample, self.signs))
 
     def tally(self) -> np.ndarray:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
@@ -135,7 +136,8 @@ class Tracer:
         self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(), np.multiply(light.color, light.intensity),
                            isinstance(light, SAMPLED), shadow_key(light)) for light in plan.lights]
         # something asks which sample a ray belongs to
-        self.numbered = lens is not None or plan.gloss or any(lamp.sampled for lamp in self.lamps)
+        self.filter = filters.made(settings.filter) if plan.filter else None
+        self.numbered = lens is not None or plan.gloss or plan.filter or any(lamp.sampled for lamp in self.lamps)
         self.fog = fogs.numbers(fog) if plan.fog else None
 
     def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool],
@@ -175,7 +177,11 @@ class Tracer:
         counts, clock = np.zeros_like(scratch.counts), scratch.clock
         scratch.sample[:, :n] = 0
         clock.lap("primary rays", "core")
-        if self.lens is not None and first is None:     # a first sample goes through the middle
+        if self.filter is not None and first is None:   # a first sample is the pixel's centre
+            filters.spread(wave, n, scratch.target, scratch.number, self.view, self.settings.size[0], self.filter.place, self.filter.sign,
+                           self.settings.seed, scratch.signs)
+            clock.lap("pixel filter", "filter")
+        if self.lens is not None and first is None:     # and goes through the middle
             bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
             clock.lap("depth of field", "lens")
         counts[PRIMARY], counts[PRIMARY_HITS] = n, 0
@@ -191,7 +197,12 @@ class Tracer:
             clock.lap("film", "core")
         if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, first):
             return False
-        counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
+        if len(film.plain):
+            if first is not None:
+                scratch.signs[:n] = 1
+            counts[NONFINITE] = filters.commit(film, scratch.sample, n, scratch.target, scratch.signs)
+        else:
+            counts[NONFINITE] = films.commit(film, scratch.sample, n, scratch.target)
         clock.lap("film", "core")
         scratch.counts += counts
         return True

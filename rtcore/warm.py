@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, fog as fogs, gloss, jit, lens, recast, rows, shading
+from rtcore import adaptive, bvh, eye, film as films, filters, fog as fogs, gloss, jit, lens, recast, rows, shading
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.keep import Memory, Recall
@@ -46,6 +46,15 @@ def _core(dtype):
 def _lens(dtype):
     wave, target, n = _wave(dtype)
     lens.bend(wave, n, target, np.ones(n, np.int32), Camera(aperture=1).lens(), 0)
+
+
+def _filter(dtype):
+    wave, target, n = _wave(dtype)
+    one, signs = filters.made("mitchell"), np.empty(n, np.float32)
+    filters.spread(wave, n, target, np.ones(n, np.int32), Camera().rays(8, 8), 8, one.place, one.sign, 0, signs)
+    film = films.new_film(8, 8, signed=True)
+    filters.commit(film, np.zeros((3, 64), np.float32), n, target, signs)
+    filters.settled(film, one.gain)
 
 
 def _glow(dtype):
@@ -156,7 +165,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
     "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
     "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
-    "keep": ("rtcore.keep", _keep), "gloss": ("rtcore.gloss", _gloss),
+    "keep": ("rtcore.keep", _keep), "gloss": ("rtcore.gloss", _gloss), "filter": ("rtcore.filters", _filter),
     "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},

@@ -54,6 +54,7 @@ def test_sentences():
         "No tree is built for cones and cylinders (only 1: each is tested), planes (they are unbounded) and spheres (only 1: each is "
         "tested).",
         "Depth of field is left out: the camera is a pinhole.",
+        "Pixel filter is left out: with a box, samples lie evenly in their pixel.",
         "Smooth normals are left out: no mesh brings normals.",
         "Patterns are left out: no visible material has one.",
         "Fog is left out: the scene has none.",

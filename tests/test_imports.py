@@ -23,7 +23,7 @@ LAYERS = (
     {"rtcore.bvh", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.lens", "rtcore.shading", "rtcore.fog", "rtcore.film",
-     "rtcore.schedule", "rtcore.adaptive", "rtcore.keep", "rtcore.pace", "rtcore.gloss"},
+     "rtcore.schedule", "rtcore.adaptive", "rtcore.keep", "rtcore.pace", "rtcore.gloss", "rtcore.filters"},
     {"rtcore.files", "rtcore.flatten", "rtcore.plan", "rtcore.edits"},
     {"rtcore.algebra", "rtcore.recast", "rtcore.trace"},
     {"rtcore.picture"},

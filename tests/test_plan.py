@@ -51,8 +51,8 @@ def test_every_stage_is_kept_or_left_out_with_a_reason(name):
     assert all(why and why[0].islower() or why[0].isdigit() for _, why in result.left_out)
     assert set(result.kernels) <= set(ALL)
     assert {stage for stage in (*result.stages, *left) if stage.startswith("hits: ")} == {f"hits: {kind.name}" for kind in KINDS}
-    for stage in ("depth of field", "shadow rays", "smooth normals", "patterns", "fog", "reflected and refracted rays", "glossy reflection",
-                  "further samples"):
+    for stage in ("pixel filter", "depth of field", "shadow rays", "smooth normals", "patterns", "fog", "reflected and refracted rays",
+                  "glossy reflection", "further samples"):
         assert (stage in result.stages) != (stage in left)
     stats = rtcore.render(made, (8, 6), **{"spp" if k == "samples" else k: v for k, v in settings.items()}).stats
     assert stats["stages"] == list(plan(made, Settings(**{"samples": 1, **settings})).stages)
@@ -62,7 +62,8 @@ def test_reasons_are_the_right_ones():
     assert dict(plan(VARIANTS["full"][0], Settings(samples=4)).left_out) == {
         f"tree: {kind.name}": "they are unbounded" if kind.bounds is None else "only 1: each is tested"
         for kind in KINDS if kind.name not in ("sphere", "triangle")} | {
-            "depth of field": "the camera is a pinhole", "glossy reflection": "no visible material is rough and reflects or transmits"}
+            "depth of field": "the camera is a pinhole", "pixel filter": "with a box, samples lie evenly in their pixel",
+            "glossy reflection": "no visible material is rough and reflects or transmits"}
     off = dict(plan(*(VARIANTS["switched off"][0], Settings(shadows=False, fog=False, reflections=False))).left_out)
     assert off["shadow rays"] == off["fog"] == off["reflected and refracted rays"] == "switched off"
     bare = dict(plan(scene(), Settings(max_depth=1)).left_out)

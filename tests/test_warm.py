@@ -64,7 +64,7 @@ for precision in ("f64", "f32"):
             image = rtcore.render(scene, (24, 16), 2, precision=precision, error=1e-9)
             assert image.stats["rays"]["refraction"] > 0
     assert rtcore.render(scene, (24, 16), 12, precision=precision, adaptive=True).stats["samples"]["most"] > 8
-    rtcore.render(Scene(objects=[flat], camera=Camera(aperture=0.1)), (24, 16), 2, precision=precision)
+    rtcore.render(Scene(objects=[flat], camera=Camera(aperture=0.1)), (24, 16), 2, precision=precision, filter="mitchell")
     for view in ("normal", "depth", "object", "error", "cost", "barycentrics", "shadow"):
         rtcore.render(scene, (24, 16), precision=precision, view=view)
     hits = rtcore.intersect(scene, [(0, 0, -5)] * 20, [(0, 0, 1)] * 20, precision=precision)

@@ -45,6 +45,7 @@ def arguments(parser: Parser) -> None:
     end.add_argument("--error", metavar="E", type=real, help="trace until the estimated root mean square error is this")
     parser.add_argument("--adaptive", action=argparse.BooleanOptionalAction,
                         help="put the samples where the error is (default: with --time and --error); --spp is then their mean")
+    parser.add_argument("--filter", metavar="NAME", help="pixel filter: box (the default), gaussian or mitchell")
     parser.add_argument("--precision", metavar="f32|f64", help="float type of the geometry (default f64)")
     parser.add_argument("--threads", metavar="N", type=whole, help="render threads (default: one per core)")
     parser.add_argument("--max-depth", metavar="N", type=whole, help="longest chain of rays, the eye's included (default 5)")
@@ -62,8 +63,8 @@ def run(args, parser: Parser) -> int:
     samples = args.spp if args.spp is not None else SAMPLES if args.time is None and args.error is None else NO_END
     adaptive = args.adaptive if args.adaptive is not None else args.time is not None or args.error is not None
     settings = settings_from(
-        parser, size=args.size, samples=samples, adaptive=adaptive, seconds=args.time, error=args.error, precision=args.precision,
-        threads=args.threads, max_depth=args.max_depth, shadows=not args.no_shadows, fog=not args.no_fog,
+        parser, size=args.size, samples=samples, adaptive=adaptive, seconds=args.time, error=args.error, filter=args.filter,
+        precision=args.precision, threads=args.threads, max_depth=args.max_depth, shadows=not args.no_shadows, fog=not args.no_fog,
         reflections=not args.no_reflections, view=args.view, seed=args.seed)
     _check_outputs(args)
     enough_memory(*settings.size)

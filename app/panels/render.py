@@ -11,7 +11,8 @@ from app.panels.base import Panel
 from app.session import Session
 
 WHOLE = ("max_depth", "threads", "seed")
-SEEN, ENDS, HOW = ("view", "exposure", "scale"), ("samples", "seconds", "error"), ("adaptive", "max_depth", "threads", "precision", "seed")
+SEEN, ENDS = ("view", "exposure", "scale"), ("samples", "seconds", "error")
+HOW = ("adaptive", "filter", "max_depth", "threads", "precision", "seed")
 
 
 class RenderPanel(Panel):
