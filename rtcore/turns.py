@@ -6,7 +6,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rtcore.lanes import F32, MASK
+from rtcore.lanes import F32, I8, MASK
 
 I32, I64 = ir.IntType(32), ir.IntType(64)
 #: Batcher's odd-even merge sort of eight: the pairs that each step compares.
@@ -70,3 +70,42 @@ def prefetch_either(tc, which, x, i, y, j):
             b.call(function, [b.gep(p, [I32(64 * line)]), I32(0), I32(3), I32(1)])
         return ctx.get_dummy_value()
     return types.void(types.boolean, x, types.intp, y, types.intp), gen
+
+
+def _bytes(ctx, b, t, array):
+    """Pointer to 64 bytes."""
+    return b.bitcast(ctx.make_array(t)(ctx, b, array).data, ir.VectorType(I8, 64).as_pointer())
+
+
+def _set(b, vector):
+    """The bits of a vector's numbers other than 0, as an int64."""
+    count = vector.type.count
+    found = b.bitcast(b.icmp_signed("!=", vector, ir.Constant(vector.type, [0] * count)), ir.IntType(count))
+    return found if count == 64 else b.zext(found, I64)
+
+
+@intrinsic
+def forget(tc, met):
+    """Set an array of 64 bytes to 0."""
+    def gen(ctx, b, sig, a):
+        b.store(ir.Constant(ir.VectorType(I8, 64), [0] * 64), _bytes(ctx, b, met, a[0]), align=1)
+        return ctx.get_dummy_value()
+    return types.void(met), gen
+
+
+@intrinsic
+def which(tc, met, k):
+    """An int64 with the bits set of those of 64 bytes that have bit k."""
+    def gen(ctx, b, sig, a):
+        bit = b.shl(I8(1), b.trunc(a[1], I8))
+        t = ir.VectorType(I8, 64)
+        bit = b.insert_element(ir.Constant(t, ir.Undefined), bit, I32(0))
+        bit = b.shuffle_vector(bit, bit, ir.Constant(ir.VectorType(I32, 64), [0] * 64))
+        return _set(b, b.and_(b.load(_bytes(ctx, b, met, a[0]), align=1), bit))
+    return types.int64(met, types.intp), gen
+
+
+@intrinsic
+def octets(tc, mask):
+    """Which of the eight bytes of an int64 are not 0, the lowest as bit 0."""
+    return types.int64(types.int64), lambda ctx, b, sig, a: _set(b, b.bitcast(a[0], ir.VectorType(I8, 8)))

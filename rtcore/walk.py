@@ -17,19 +17,21 @@ from rtcore.across import largest, lowest_bit, smallest
 from rtcore.bvh import LINK, NO_CHILD, NODE, ORDER, STACK, WIDTH
 from rtcore.jit import inline, inline_new
 from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, load3, narrow, select, size, splat, store, vec3, with_sign)
-from rtcore.turns import prefetch_either, push
+from rtcore.turns import forget, octets, prefetch_either, push, which
 from rtcore.wave import DX, OX, START, T
 
 PACKET = 64
 GROUPS = PACKET // 8
 SLACK = np.float32(2.0 ** -21)
+ONE = np.float32(1)
 TINY = 2.0 ** -60       # a direction's part that counts as 0
 
 # rows of Walk.coarse: 1/direction, offsets of low and of high planes, reach, direction, origin
 INVERSE, LOWS, HIGHS, REACH, WAY, FROM = 0, 3, 6, 9, 10, 13
 # places in Walk.state; nodes are eight rows and eight children, so that places are told by shifts
 TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING, OCTANT = range(8)
-BEAM, SINGLY, VECTORS = range(3)    # state[MODE]: a pyramid around all rays, each ray on its own, vectors without a pyramid
+#: state[MODE]: a pyramid around all rays, each ray on its own, those that meet a node together; or there is one leaf and nothing to walk.
+BEAM, SINGLY, SOME, ALONE = range(4)
 SLOTS = 8               # rays walked in turns; a power of two
 # places in Walk.beam: over all rays the least and the largest origin and slope (the step for a step along the main axis), the main axis'
 # direction, how far any ray still reaches, and what to add to a plane for its earliest entry and latest exit
@@ -37,7 +39,7 @@ BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6
 BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
 
 #: A beam's rays have at least this part along a common axis, and slopes that differ by no more than that; others scatter.
-STRAIGHT, SPREAD = np.float32(0.4), np.float32(0.35)
+STRAIGHT, SPREAD = np.float32(0.4), np.float32(0.05)
 
 
 class Walk(NamedTuple):
@@ -48,11 +50,12 @@ class Walk(NamedTuple):
     beam: np.ndarray    # float32 (16), as named above
     limit: np.ndarray   # int32 (16, 64): the bits of coarse
     keys: np.ndarray    # int64 (slots, most): what waits of single rays, as `push` leaves it
-    stack: np.ndarray   # int32 (1, most): what waits of packets: 2 (8 node + column) + whether all meet it
+    stack: np.ndarray   # int32 (1, most): what waits of packets: 2 (8 node + column) + whether all meet it; of SOME rays, the link to it
     entry: np.ndarray   # float32 (1, most): where it is entered
-    mask: np.ndarray    # int64 (most): the vectors of rays that wait for a node
+    mask: np.ndarray    # int64 (most): the vectors that wait for a node; of SOME rays, the rays
     slots: np.ndarray   # int64 (slots, 2): the ray, -1 none any more; how many nodes wait
     near: np.ndarray    # float32 (1, 8): where the children of a node are
+    met: np.ndarray     # uint8 (64): which children of a node each ray meets
     state: np.ndarray   # int64, as named above
 
 
@@ -62,7 +65,8 @@ def new_walk(rays):
     coarse = np.empty((16, PACKET), np.float32)
     return Walk(coarse, np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32), coarse.view(np.int32),
                 np.empty((SLOTS, STACK + WIDTH), np.int64), np.empty((1, STACK), np.int32), np.empty((1, STACK), np.float32),
-                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(8, np.int64))
+                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(PACKET, np.uint8),
+                np.empty(8, np.int64))
 
 
 @inline
@@ -70,7 +74,11 @@ def begin(walk, rays, start, n, tree, singly):
     """Bring the packet of rays start .. min(start + 64, n) to the tree's root. singly: how many nodes a tree must have for rays
     that scatter to be walked singly, which costs less where nodes come from memory."""
     eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
-    frame, coarse, fine, state = tree.frame, walk.coarse, walk.fine, walk.state
+    frame, coarse, fine, state, box = tree.frame, walk.coarse, walk.fine, walk.state, tree.box
+    alone = box.shape[0] > 0 and tree.link[LINK, 0] < 0 and box[0, 1] > box[3, 1]
+    # the box that rays are tested against: the only leaf's, or the frame itself
+    l0, l1, l2 = (box[0, 0], box[1, 0], box[2, 0]) if alone else (-ONE, -ONE, -ONE)
+    h0, h1, h2 = (box[3, 0], box[4, 0], box[5, 0]) if alone else (ONE, ONE, ONE)
     groups = min(GROUPS, (n - start + 7) // 8)
     alive, waiting = 0, 0
     two = splat(np.float32(2))
@@ -90,9 +98,9 @@ def begin(walk, rays, start, n, tree, singly):
         iy = 1 / with_sign(greatest(size(d.y), TINY), d.y)
         iz = 1 / with_sign(greatest(size(d.z), TINY), d.z)
         away = greatest(greatest(size(o.x), size(o.y)), size(o.z)) * eps
-        edge = away + 1.001
-        a0, b0, c0 = (-edge - o.x) * ix, (-edge - o.y) * iy, (-edge - o.z) * iz
-        a1, b1, c1 = (edge - o.x) * ix, (edge - o.y) * iy, (edge - o.z) * iz
+        pad = away + 0.001
+        a0, b0, c0 = (l0 - pad - o.x) * ix, (l1 - pad - o.y) * iy, (l2 - pad - o.z) * iz
+        a1, b1, c1 = (h0 + pad - o.x) * ix, (h1 + pad - o.y) * iy, (h2 + pad - o.z) * iz
         enter = greatest(greatest(least(a0, a1), least(b0, b1)), greatest(least(c0, c1), 0))
         leave = least(least(greatest(a0, a1), greatest(b0, b1)), greatest(c0, c1))
         far = load(rays.ray, T, i)
@@ -100,6 +108,8 @@ def begin(walk, rays, start, n, tree, singly):
         if any_lane(meets):
             alive |= 1 << g
             waiting |= bits(meets) << j
+        if alone:
+            continue
         o = along(o, enter, d)
         store(fine, 0, j, enter)
         store(fine, 1, j, speed)
@@ -126,8 +136,10 @@ def begin(walk, rays, start, n, tree, singly):
         y0, y1 = least(y0, select(meets, dy, two)), greatest(y1, select(meets, dy, -two))
         z0, z1 = least(z0, select(meets, dz, two)), greatest(z1, select(meets, dz, -two))
     state[TOP], state[WAITING], state[ALIVE] = 0, waiting, alive
-    if alive == 0 or tree.link.shape[0] == 0:
+    if alive == 0 or box.shape[0] == 0:
         state[MODE] = BEAM
+    elif alone:
+        state[MODE], state[ACTIVE], state[TOP] = ALONE, alive, 1
     else:
         # the axis along which all rays go the same way, and furthest
         along_x, along_y, along_z = _common(x0, x1), _common(y0, y1), _common(z0, z1)
@@ -140,9 +152,11 @@ def begin(walk, rays, start, n, tree, singly):
                     walk.slots[k, 0], walk.slots[k, 1] = 0, 0
             else:
                 some = lowest_bit(waiting)
-                state[MODE] = VECTORS
+                state[MODE] = SOME
                 state[OCTANT] = (coarse[WAY, some] < 0) + 2 * (coarse[WAY + 1, some] < 0) + 4 * (coarse[WAY + 2, some] < 0)
         walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP] = -1, 0, alive, 1
+        if state[MODE] == SOME:
+            walk.stack[0, 0], walk.mask[0] = 0, waiting
 
 
 @inline
@@ -202,6 +216,8 @@ def _reach(far, speed, enter):
 def shrink(walk, rays, start):
     """After a leaf: the active vectors need not look past what they hit."""
     coarse, active = walk.coarse, walk.state[ACTIVE]
+    if walk.state[MODE] == ALONE:
+        return
     while active:
         g = lowest_bit(active)
         active &= active - 1
@@ -219,7 +235,13 @@ def shrink(walk, rays, start):
 def next_leaf(walk, tree, table):
     """The next leaf that rays of the packet may hit, as `leaf_first` and `leaf_end` read it, or -1; `active` tells the vectors that may.
     table: of the primitives, a `kind.Table`, to be fetched ahead."""
-    return _next_of_ray(walk, tree, table) if walk.state[MODE] == SINGLY else _next_of_packet(walk, tree)
+    mode = walk.state[MODE]
+    if mode == BEAM:
+        return _next_of_packet(walk, tree)
+    if mode == ALONE:
+        walk.state[TOP] -= 1
+        return -1 - np.int64(tree.link[LINK, 0]) if walk.state[TOP] == 0 else -1
+    return _next_of_some(walk, tree) if mode == SOME else _next_of_ray(walk, tree, table)
 
 
 @inline
@@ -291,18 +313,55 @@ def _next_of_ray(walk, tree, table):
 
 
 @inline
+def _next_of_some(walk, tree):
+    """Rays that scatter, all of which that meet a node together: each against its eight children at once."""
+    coarse, stack, mask, met, state = walk.coarse, walk.stack, walk.mask, walk.met, walk.state
+    box, link = tree.box, tree.link
+    top, octant = state[TOP], state[OCTANT]
+    while top > 0:
+        top -= 1
+        node, rays = np.int64(stack[0, top]), mask[top]
+        if node < 0:
+            state[TOP], state[ACTIVE] = top, octets(rays)
+            return -1 - node
+        row = node << 3
+        x0, y0, z0 = load(box, row, 0), load(box, row + 1, 0), load(box, row + 2, 0)
+        x1, y1, z1 = load(box, row + 3, 0), load(box, row + 4, 0), load(box, row + 5, 0)
+        forget(met)
+        while rays:
+            j = lowest_bit(rays)
+            rays &= rays - 1
+            ix, iy, iz = coarse[INVERSE, j], coarse[INVERSE + 1, j], coarse[INVERSE + 2, j]
+            a, u = fma(x0, ix, coarse[LOWS, j]), fma(x1, ix, coarse[HIGHS, j])
+            b, v = fma(y0, iy, coarse[LOWS + 1, j]), fma(y1, iy, coarse[HIGHS + 1, j])
+            c, w = fma(z0, iz, coarse[LOWS + 2, j]), fma(z1, iz, coarse[HIGHS + 2, j])
+            near = greatest(greatest(least(a, u), least(b, v)), greatest(least(c, w), np.float32(0)))
+            far = least(least(greatest(a, u), greatest(b, v)), least(greatest(c, w), coarse[REACH, j]))
+            met[j] = bits(near <= far)
+        order = np.int64(link[row + ORDER, octant]) & 0xFFFFFFFF | NO_CHILD << 32      # eight leave no room for the end
+        while order & 15 != NO_CHILD:
+            k = order & 15
+            some = which(met, k)
+            stack[0, top], mask[top] = link[row + LINK, k], some
+            top += some != 0
+            order >>= 4
+    state[TOP] = 0
+    return -1
+
+
+@inline
 def _next_of_packet(walk, tree):
     """All rays together: the next leaf that one of them meets. A box that is wider than the beam around them is taken to be met."""
     coarse, beam, stack, entry, mask, near, state = walk.coarse, walk.beam, walk.stack, walk.entry, walk.mask, walk.near, walk.state
     box, link = tree.box, tree.link
-    top, axis, bundled = state[TOP], state[AXIS], state[MODE] == BEAM
+    top, axis = state[TOP], state[AXIS]
     p, q = (axis + 1) % 3, (axis + 2) % 3
     sign, farthest = beam[SIGN], beam[FARTHEST]
     main0, main1 = (axis, axis + 3) if sign > 0 else (axis + 3, axis)
     while top > 0:
         top -= 1
         place, waiting, node = np.int64(stack[0, top]), mask[top], np.int64(0)
-        if bundled and not entry[0, top] <= farthest:
+        if not entry[0, top] <= farthest:
             continue
         if place >= 0:
             k = (place >> 1) & 7
@@ -316,13 +375,6 @@ def _next_of_packet(walk, tree):
                     state[TOP], state[ACTIVE] = top, waiting
                     return -1 - node
         row = node << 3
-        if not bundled:
-            order = np.int64(link[row + ORDER, state[OCTANT]]) & 0xFFFFFFFF | NO_CHILD << 32      # eight leave no room for the end
-            while order & 15 != NO_CHILD:
-                stack[0, top], mask[top] = (node << 4) + 2 * (order & 15), waiting
-                order >>= 4
-                top += 1
-            continue
         enter = greatest(fma(load(box, row + main0, 0), sign, beam[ENTER]), np.float32(0))
         leave = least(fma(load(box, row + main1, 0), sign, beam[LEAVE]), farthest)
         s0, s1 = beam[SLOPE_FROM + p], beam[SLOPE_TO + p]
