@@ -115,14 +115,14 @@ def _settle(film, gain, total, split, square):
         scatter = film.square[p]
         light = 0.0
         for k in range(3):
-            plain, t, s = film.plain[p, k], film.total[p, k], np.float64(film.split[p, k])
-            mean = (t - weight * plain / n) / (n * gain) + plain / n
-            # how far the halves' samples are from the mean, weighted: what their means differ by, to the first order
-            left = ((t + s) - mean * (weight + apart)) / (2 * first * gain)
-            right = ((t - s) - mean * (weight - apart)) / (2 * second * gain) if second > 0 else left
+            plain, t, s = film.plain[p, k] / n, film.total[p, k], np.float64(film.split[p, k])
+            mean = (t - weight * plain) / (n * gain) + plain
+            # how far the mean is off for the samples of each half, to the first order
+            left = ((t + s) - plain * (weight + apart)) / (2 * first * gain)
+            right = ((t - s) - plain * (weight - apart)) / (2 * second * gain) if second > 0 else left
             total[p, k] = n * mean
             split[p, k] = (2 * (left - right) - n * mean * (1 / first - 1 / second)) / (1 / first + 1 / second) if second > 0 else mean
-            scatter += (n * mean * mean - 2 * mean * plain) / 3
+            scatter -= n * plain * plain / 3
             light += n * mean * mean / 3
         square[p] = max(scatter, 0.0) / (gain * gain) + light
 
