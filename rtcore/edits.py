@@ -5,7 +5,6 @@
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.lights import SHINE, STUDIO
@@ -76,10 +75,10 @@ def change(old: tuple[Scene, Camera, Settings], new: tuple[Scene, Camera, Settin
         edits.add("lens" if _pinhole(old[1]) == _pinhole(new[1]) else "camera")
     if old[0] is not new[0]:
         edits |= _scene(old[0], new[0])
-        if len(before) != len(after) or any(a.path != b.path for a, b in zip(before, after)):
+        if before is not after and (len(before) != len(after) or any(a.path != b.path for a, b in zip(before, after))):
             edits.add("nodes")
         else:
-            for index, (a, b) in enumerate(zip(before, after)):
+            for index, (a, b) in enumerate(zip(before, after) if before is not after else ()):
                 if edit := _leaf(a, b):
                     edits |= edit
                     if edit & {"hide", "shape"}:
@@ -118,7 +117,7 @@ def _leaf(a: Leaf, b: Leaf) -> set[str]:
     edits = set()
     if a.visible != b.visible:
         edits.add("hide")
-    elif a.visible and (a.shape is not b.shape or not np.array_equal(a.matrix, b.matrix)):
+    elif a.visible and (a.shape is not b.shape or a.matrix.tobytes() != b.matrix.tobytes()):
         edits.add("shape")
     if a.material is not b.material and a.material != b.material:
         edits.add("material")

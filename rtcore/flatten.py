@@ -9,9 +9,10 @@ import numpy as np
 
 from rtcore.bvh import EMPTY_TREE, Tree, build
 from rtcore.fields import FieldError
-from rtcore.scene import Leaf, Scene
+from rtcore.scene import Leaf, Scene, leaves_of
 from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
 
+FEW, MANY = 16, 20_000      # of leaves with so few primitives what they were packed to is kept, in kinds of not too many leaves
 DTYPES = {"f32": np.float32, "f64": np.float64}
 
 
@@ -26,6 +27,7 @@ class Group(NamedTuple):
     key: tuple          # what it was made from: a group is made anew only when that has changed
     owner: np.ndarray   # int32: the leaf of each of its primitives
     order: np.ndarray   # int32: where each of them stood before the tree was built: leaf by leaf, in the order of the shape
+    packs: dict[int, Packed]    # of leaves of few primitives: what they were packed to, for packing takes longer than all the rest
     dropped: int        # degenerate primitives left out
 
 
@@ -46,7 +48,9 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
     Raises FieldError where a placed shape's numbers are not finite or its transforms together can't be inverted.
     """
     dtype = DTYPES[precision]
-    leaves = tuple(scene.leaves())
+    leaves = leaves_of(scene)
+    if previous is not None and previous.leaves is leaves and previous.dtype == dtype:
+        return previous
     kinds: dict[Kind, list[int]] = {}
     for index, leaf in enumerate(leaves):
         if leaf.visible:
@@ -57,7 +61,9 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         key = tuple((index, leaves[index].shape, leaves[index].matrix.tobytes()) for index in kinds[kind])
         group = old.get(kind)
         if group is None or not _same(group.key, key):
-            group = _gather(kind, key, [(index, packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
+            known = {} if group is None else {index: group.packs[index] for index, *same in group.key
+                                              if index in group.packs and index < len(leaves) and _is(same, leaves[index])}
+            group = _gather(kind, key, [(index, known.get(index) or packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
         if len(group.owner):        # all of it may be degenerate
             groups.append(group._replace(first=first))
         owners.append(group.owner)
@@ -69,6 +75,11 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
 def nbytes(arrays: Iterable) -> int:
     """Bytes of arrays, of tuples of arrays and so on."""
     return sum(a.nbytes if isinstance(a, np.ndarray) else nbytes(a) for a in arrays)
+
+
+def _is(placed: list, leaf: Leaf) -> bool:
+    """Whether a leaf is this shape under this matrix."""
+    return placed[0] is leaf.shape and placed[1] == leaf.matrix.tobytes()
 
 
 def _same(a: tuple, b: tuple) -> bool:
@@ -129,7 +140,8 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
             extra = extra[order]
     table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, np.float64 if kind.shared_extra else dtype), side,
                   np.ascontiguousarray(exact))
-    return Group(kind, tree, table, 0, has_tree, key, owner, order, sum(p.dropped for _, p in packs))
+    kept = {index: p for index, p in packs if len(p.data) <= FEW} if len(packs) <= MANY else {}
+    return Group(kind, tree, table, 0, has_tree, key, owner, order, kept, sum(p.dropped for _, p in packs))
 
 
 def renumbering(old: Geometry, new: Geometry, changed: Iterable[int], gone: int) -> np.ndarray:

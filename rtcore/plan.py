@@ -5,7 +5,7 @@ import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.lights import SHINE, STUDIO, Ambient
-from rtcore.scene import Leaf, Light, Scene
+from rtcore.scene import Latest, Leaf, Light, Material, Scene, leaves_of
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL, KINDS
 from rtcore.shapes.kind import Kind
@@ -37,14 +37,21 @@ class Plan(NamedTuple):
     samples: int                    # per pixel
 
 
-def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = None, camera: Camera | None = None) -> Plan:
-    """The plan for a scene, from its own camera if none is given; `leaves` saves a second walk over it."""
-    visible = [leaf for leaf in (scene.leaves() if leaves is None else leaves) if leaf.visible]
+@Latest
+def _contents(leaves: tuple[Leaf, ...]) -> tuple[dict[Kind, int], tuple[Material, ...], bool]:
+    """Of what is visible: the number of primitives of each kind, the materials, whether there are smooth normals."""
+    visible = [leaf for leaf in leaves if leaf.visible]
     counts: dict[Kind, int] = {}
     for leaf in visible:
         kind = leaf.shape.kind(leaf.matrix)
         counts[kind] = counts.get(kind, 0) + leaf.shape.count()
-    materials = {id(leaf.material): leaf.material for leaf in visible}.values()
+    return (counts, tuple({id(leaf.material): leaf.material for leaf in visible}.values()),
+            any(getattr(leaf.shape, "normals", None) is not None for leaf in visible))
+
+
+def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan:
+    """The plan for a scene, from its own camera if none is given."""
+    counts, materials, smooth = _contents(leaves_of(scene))
     lit, camera = VIEW[settings.view].needs_light, camera or scene.camera or Camera()
     stages, out = ["primary rays"], []
     lens = _keep(stages, out, "depth of field", [
@@ -79,7 +86,6 @@ def plan(scene: Scene, settings: Settings, leaves: tuple[Leaf, ...] | None = Non
         why = "none shines from a place or direction" if answers or not materials else "no visible material answers light"
         out.append(("lights", why if lit else NO_LIGHT))
     shadows = _keep(stages, out, "shadow rays", [(lit, NO_LIGHT), (settings.shadows, "switched off"), (lights, "no light to cast them")])
-    smooth = any(getattr(leaf.shape, "normals", None) is not None for leaf in visible)
     _keep(stages, out, "smooth normals", [(smooth, "no mesh brings normals")])
     _keep(stages, out, "patterns", [(any(m.checker for m in materials), "no visible material has one")])
     fog = _keep(stages, out, "fog", [

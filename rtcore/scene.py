@@ -3,8 +3,9 @@
 An edit makes a new Scene that shares all it did not touch, so undo is a list of scenes and a render needs no lock.
 Nothing here is compiled. Lengths are in scene units, angles in degrees, colours linear red, green, blue.
 """
+import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -256,7 +257,9 @@ class Node(Record, frozen=True, kw_only=True):
 
 
 def as_nodes(items, where: str) -> tuple[Node, ...]:
-    """Nodes from nodes and bare shapes."""
+    """Nodes from nodes and bare shapes; what is that already stays the very same."""
+    if isinstance(items, tuple) and all(isinstance(item, Node) for item in items):
+        return items
     nodes = []
     for i, item in enumerate(items):
         if not isinstance(item, (Node, Shape)):
@@ -342,23 +345,53 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
 
     def leaves(self) -> Iterator[Leaf]:
         """Every shape of the scene with the uses written out, depth first; a hit's node index counts these, hidden ones too."""
+        return _walk(self.objects, self.definitions, self.materials)
 
-        def walk(node: Node, path, matrix, material, visible):
-            if node.transform:
-                matrix = matrix @ node.matrix()
-            if node.material is not None:
-                material = self.materials[node.material] if isinstance(node.material, str) else node.material
-            visible = visible and node.visible
-            if node.shape is not None:
-                yield Leaf(path, node.shape, matrix, material, visible)
-            elif node.use is not None:
-                yield from walk(self.definitions[node.use], (*path, 0), matrix, material, visible)
-            else:
-                for i, child in enumerate(node.children):
-                    yield from walk(child, (*path, i), matrix, material, visible)
 
-        for i, node in enumerate(self.objects):
-            yield from walk(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
+def _walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: dict[str, Material]) -> Iterator[Leaf]:
+    def walk(node: Node, path, matrix, material, visible):
+        if node.transform:
+            matrix = matrix @ node.matrix()
+        if node.material is not None:
+            material = materials[node.material] if isinstance(node.material, str) else node.material
+        visible = visible and node.visible
+        if node.shape is not None:
+            yield Leaf(path, node.shape, matrix, material, visible)
+        elif node.use is not None:
+            yield from walk(definitions[node.use], (*path, 0), matrix, material, visible)
+        else:
+            for i, child in enumerate(node.children):
+                yield from walk(child, (*path, i), matrix, material, visible)
+
+    for i, node in enumerate(objects):
+        yield from walk(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
+
+
+class Latest:
+    """A function that remembers its last result, and gives it again for the very same arguments. Edits share what they don't touch, so
+    identity tells that nothing has changed."""
+
+    def __init__(self, function: Callable):
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._last: tuple[tuple, object] = (), None     # replaced at once, so threads may share it
+
+    def __call__(self, *arguments):
+        last, result = self._last
+        if len(last) != len(arguments) or any(a is not b for a, b in zip(last, arguments)):
+            result = self._function(*arguments)
+            self._last = arguments, result
+        return result
+
+
+@Latest
+def _leaves(objects, definitions, materials) -> tuple[Leaf, ...]:
+    return tuple(_walk(objects, definitions, materials))
+
+
+def leaves_of(scene: Scene) -> tuple[Leaf, ...]:
+    """`scene.leaves()`, the very same tuple for scenes that differ in lights, fog or the like only."""
+    return _leaves(scene.objects, scene.definitions, scene.materials)
 
 
 def one_of(what: str, names) -> str:

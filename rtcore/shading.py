@@ -14,7 +14,7 @@ from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, 
                           wide, with_sign, zero)
 from rtcore.neighbours import consecutive, load1, store1
 from rtcore.powers import floor
-from rtcore.scene import Background, Leaf, Material, invertible
+from rtcore.scene import Background, Latest, Leaf, Material, invertible
 from rtcore.shapes._surface import normalized
 from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
 
@@ -43,6 +43,14 @@ class Look(NamedTuple):
 
 def make_look(leaves: tuple[Leaf, ...], leaf: np.ndarray, ambient: np.ndarray, background: Background, up) -> Look:
     """Tables for the leaves that the primitives (their leaf indices) belong to."""
+    top = background.color if background.top is None else background.top
+    backdrop = np.array([background.color, top, np.array(up) / np.linalg.norm(up)], np.float64)
+    return Look(*_tables(leaves, leaf), ambient, backdrop)
+
+
+@Latest
+def _tables(leaves: tuple[Leaf, ...], leaf: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The first three fields of `Look`."""
     rows, index, used = [], {}, np.unique(leaf)
     row_of, depth_of = np.zeros(len(leaves), np.int32), np.zeros(len(leaves), np.int32)
     for i in used:
@@ -54,9 +62,7 @@ def make_look(leaves: tuple[Leaf, ...], leaf: np.ndarray, ambient: np.ndarray, b
             rows.append(_row(material, matrix))
         row_of[i] = index[key]
         depth_of[i] = optical_depth(material)
-    top = background.color if background.top is None else background.top
-    backdrop = np.array([background.color, top, np.array(up) / np.linalg.norm(up)], np.float64)
-    return Look(np.array(rows).reshape(-1, MATERIAL_COLUMNS), row_of[leaf], depth_of[leaf], ambient, backdrop)
+    return np.array(rows).reshape(-1, MATERIAL_COLUMNS), row_of[leaf], depth_of[leaf]
 
 
 def optical_depth(material: Material) -> int:

@@ -20,9 +20,9 @@ AWAY = Translate((3e5, 2e5, -1e6))
 DARK = (Point(position=(1, 9, 2), intensity=0), Directional(direction=(1, -2, 0.5), intensity=0))
 
 
-def full_plan(scene, settings, leaves=None, camera=None):
+def full_plan(scene, settings, camera=None):
     """Everything runs: lights that bring nothing, their shadow rays, fog, bounces."""
-    composed = plan(scene, settings, leaves, camera)
+    composed = plan(scene, settings, camera)
     return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True, gloss=True)
 
 
