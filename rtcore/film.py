@@ -165,9 +165,10 @@ def _commit_one(film, p, r, g, b):
 
 
 @kernel
-def develop(film, width, height, spacing, pixels):
-    """The mean picture, pixels (h, w, 3) float32; a pixel without a sample shows that of the lattice before it."""
-    for y in range(height):
+def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
+    """Rows first .. last - 1 of the mean picture, pixels (h, w, 3) float32, and which leaf each pixel shows and how far away; leaf: that of
+    each primitive. A pixel without a sample shows that of the lattice before it."""
+    for y in range(first, last):
         for x in range(width):
             p, step = y * width + x, 1
             while film.count[p] == 0 and step < spacing:
@@ -176,22 +177,20 @@ def develop(film, width, height, spacing, pixels):
             c = max(film.count[p], 1)
             for k in range(3):
                 pixels[y, x, k] = film.total[p, k] / c
+            node[y, x] = leaf[film.prim[p]] if film.prim[p] >= 0 else -1
+            distance[y, x] = film.distance[p]
 
 
 @kernel
-def fill(film, leaf, width, height, spacing, node, distance, normal, doubt):
-    """First hits over the whole picture, (h, w) but for the normals (h, w, 3), as `develop` fills it; leaf: that of each primitive."""
+def sources(film, width, height, spacing, out):
+    """The pixel that each one shows, itself or that of the lattice before it: as `develop` fills the picture. out: int32 (h·w)."""
     for y in range(height):
         for x in range(width):
             p, step = y * width + x, 1
             while film.count[p] == 0 and step < spacing:
                 step *= 2
                 p = y // step * step * width + x // step * step
-            node[y, x] = leaf[film.prim[p]] if film.prim[p] >= 0 else -1
-            distance[y, x] = film.distance[p]
-            doubt[y, x] = film.doubt[p]
-            for k in range(3):
-                normal[y, x, k] = film.normal[p, k]
+            out[y * width + x] = p
 
 
 @kernel

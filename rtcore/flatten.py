@@ -9,7 +9,8 @@ import numpy as np
 
 from rtcore.bvh import EMPTY_TREE, Tree, build
 from rtcore.fields import FieldError
-from rtcore.scene import Leaf, Scene, leaves_of
+from rtcore.latest import leaves_of
+from rtcore.scene import Leaf, Scene
 from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
 
 FEW, MANY = 16, 20_000      # of leaves with so few primitives what they were packed to is kept, in kinds of not too many leaves

@@ -1,4 +1,5 @@
 """One picture under way: from a request to its frames."""
+import functools
 import itertools
 import threading
 import time
@@ -73,11 +74,12 @@ class Start(NamedTuple):
 class Render:
     """One request under way: its film, its scratch arrays, how far it is."""
 
-    def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, start: Start):
+    def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, pool: ThreadPoolExecutor, start: Start):
         scene, camera, self.settings = self.request = request
         before, self.edits, self.memory, coarse, first, self.edge, self.soon, goes_on, threads = start
-        self.plan, self.pace = composed, pace
+        self.plan, self.pace, self.pool = composed, pace, pool
         self.finished = False   # the pass
+        self.tracing = False    # the pool is at it
         self.done = False
         self.dropped = geometry.dropped
         width, height = size = self.settings.size
@@ -113,7 +115,6 @@ class Render:
         self.elapsed = 0.0
         self.done_tiles = itertools.count(1)
         self.progress = 0.0
-        self.pool: ThreadPoolExecutor | None = None
 
     def answers(self, request: RenderRequest, keep: bool) -> bool:
         """Whether what is under way is what another request wants too, at most seen differently. The very same request is answered by
@@ -146,10 +147,10 @@ class Render:
         lit, signed = len(self.film.lit) > 0, len(self.film.plain) > 0
         return films.suits(self.film, composed.samples, lit, signed) and int(self.film.count.max()) <= uniform
 
-    def trace(self, pool: ThreadPoolExecutor, cancelled: Callable[[], bool]) -> Iterator[None]:
+    def trace(self, cancelled: Callable[[], bool]) -> Iterator[None]:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
         a thread, ends the threads' work first."""
-        self.pool, one, size = pool, self.schedule[self.number], self.settings.size
+        one, size = self.schedule[self.number], self.settings.size
         queue = tiles(one, *size, self.edge)
         share = weight(one, *size)
         each = share / max(len(queue), 1)
@@ -163,7 +164,8 @@ class Render:
         def stale() -> bool:
             return halt.is_set() or cancelled() or time.perf_counter() > deadline
 
-        shares = [pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
+        self.tracing = True
+        shares = [self.pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
         try:
             while wait(shares, patience, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
                 self.elapsed, patience = time.perf_counter() - self.prepared, PARTIAL
@@ -172,6 +174,7 @@ class Render:
             if not all(share.done() for share in shares):
                 halt.set()
             wait(shares)
+            self.tracing = False
             self.elapsed = time.perf_counter() - self.prepared
         results = [share.result() for share in shares]      # an exception of a thread comes out here
         self.finished = all(results)
@@ -275,17 +278,26 @@ class Render:
 
     def frame(self, done: bool) -> Frame:
         """The picture as it is now."""
-        began, (width, height) = time.perf_counter(), self.settings.size
-        pixels, normal = np.empty((height, width, 3), np.float32), np.empty((height, width, 3), np.float32)
-        node, distance, doubt = (np.empty((height, width), dtype) for dtype in (np.int32, np.float32, np.uint8))
-        films.develop(self.settled(), width, height, COARSEST, pixels)
-        films.fill(self.film, self.tracer.geometry.leaf, width, height, COARSEST, node, distance, normal, doubt)
+        began, film, (width, height) = time.perf_counter(), self.film, self.settings.size
+        pixels = np.empty((height, width, 3), np.float32)
+        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+        bands = [0, height]
+        if not self.tracing:    # else the pool's threads have their hands full
+            bands = np.linspace(0, height, len(self.scratches) + 1).astype(int).tolist()
+        develop = functools.partial(films.develop, self.settled(), self.tracer.geometry.leaf, width)
+        mine, *others = [(first, last, COARSEST, pixels, node, distance) for first, last in itertools.pairwise(bands)]
+        shares = [self.pool.submit(develop, *band) for band in others]
+        develop(*mine)
+        for share in shares:
+            share.result()
+
+        def spread(values: np.ndarray) -> np.ndarray:
+            return self.recast.spread(film, values, COARSEST)
         shown = VIEW[self.settings.view].draw(Seen(
-            pixels, node, self.materials, distance, normal, doubt, self.film.count.reshape(height, width),
+            pixels, node, self.materials, distance, film.count.reshape(height, width),
+            normal=lambda: spread(film.normal), doubt=lambda: spread(film.doubt), lit=lambda: spread(film.lit),
             error=lambda: np.sqrt(adaptive.squared_errors(self.settled(), width, height)).reshape(height, width),
-            lit=lambda: self.recast.spread(self.film, self.film.lit, COARSEST),
-            coordinates=lambda: self.recast.spread(self.film, self.recast.coordinates(self.film), COARSEST),
-            tests=lambda: self.recast.spread(self.film, self.recast.tests(self.film), COARSEST)))
+            coordinates=lambda: spread(self.recast.coordinates(film)), tests=lambda: spread(self.recast.tests(film))))
         self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),

@@ -97,7 +97,7 @@ class Renderer:
             self._render = render = self._begin(request, composed, geometry, coarse, left)
             self._compile, self._prepare = loaded - start, render.prepared - loaded
         while not render.done:
-            for _ in render.trace(self._pool, cancelled):
+            for _ in render.trace(cancelled):
                 if not cancelled():
                     yield render.frame(False)
             if cancelled():
@@ -126,7 +126,7 @@ class Renderer:
             soon = max(deadline - pace.frame, deadline / 4)
             known = memory is not None and all(memory.covers(tiles(one, *size, edge)) for one in passes(coarse))
             first = pace.finest(size[0] * size[1], self._threads, max(deadline, KNOWN) if known else deadline, known)
-        return Render(request, composed, geometry, pace, Start(
+        return Render(request, composed, geometry, pace, self._pool, Start(
             before, edits, memory, coarse, first, edge, soon, goes_on, self._threads))
 
     def _remember(self, before: Render, what: Change, geometry: Geometry, scene: Scene) -> Memory:

@@ -6,7 +6,7 @@ import numpy as np
 
 from rtcore.across import count, lowest_bit
 from rtcore.bvh import LINK, NODE, STACK
-from rtcore.film import Film
+from rtcore.film import Film, sources
 from rtcore.flatten import Geometry
 from rtcore.jit import inline, kernel
 from rtcore.lanes import bits, greatest, least, load, wide
@@ -25,18 +25,6 @@ def _through(view, pixel, width):
     u, v = pixel % width + 0.5, pixel // width + 0.5
     return normalized(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
                       view[1, 2] + u * view[2, 2] + v * view[3, 2])
-
-
-@kernel
-def sources(film, width, height, spacing, out):
-    """The pixel that each one shows, itself or that of the lattice before it: as `film.develop` fills the picture. out: int32 (h·w)."""
-    for y in range(height):
-        for x in range(width):
-            p, step = y * width + x, 1
-            while film.count[p] == 0 and step < spacing:
-                step *= 2
-                p = y // step * step * width + x // step * step
-            out[y * width + x] = p
 
 
 @kernel

@@ -3,9 +3,8 @@
 An edit makes a new Scene that shares all it did not touch, so undo is a list of scenes and a render needs no lock.
 Nothing here is compiled. Lengths are in scene units, angles in degrees, colours linear red, green, blue.
 """
-import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Annotated, NamedTuple
 
 import msgspec
@@ -345,11 +344,13 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
 
     def leaves(self) -> Iterator[Leaf]:
         """Every shape of the scene with the uses written out, depth first; a hit's node index counts these, hidden ones too."""
-        return _walk(self.objects, self.definitions, self.materials)
+        return walk(self.objects, self.definitions, self.materials)
 
 
-def _walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: dict[str, Material]) -> Iterator[Leaf]:
-    def walk(node: Node, path, matrix, material, visible):
+def walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: dict[str, Material]) -> Iterator[Leaf]:
+    """`Scene.leaves`, from what it depends on."""
+
+    def below(node: Node, path, matrix, material, visible):
         if node.transform:
             matrix = matrix @ node.matrix()
         if node.material is not None:
@@ -358,40 +359,13 @@ def _walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: di
         if node.shape is not None:
             yield Leaf(path, node.shape, matrix, material, visible)
         elif node.use is not None:
-            yield from walk(definitions[node.use], (*path, 0), matrix, material, visible)
+            yield from below(definitions[node.use], (*path, 0), matrix, material, visible)
         else:
             for i, child in enumerate(node.children):
-                yield from walk(child, (*path, i), matrix, material, visible)
+                yield from below(child, (*path, i), matrix, material, visible)
 
     for i, node in enumerate(objects):
-        yield from walk(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
-
-
-class Latest:
-    """A function that remembers its last result, and gives it again for the very same arguments. Edits share what they don't touch, so
-    identity tells that nothing has changed."""
-
-    def __init__(self, function: Callable):
-        functools.update_wrapper(self, function)
-        self._function = function
-        self._last: tuple[tuple, object] = (), None     # replaced at once, so threads may share it
-
-    def __call__(self, *arguments):
-        last, result = self._last
-        if len(last) != len(arguments) or any(a is not b for a, b in zip(last, arguments)):
-            result = self._function(*arguments)
-            self._last = arguments, result
-        return result
-
-
-@Latest
-def _leaves(objects, definitions, materials) -> tuple[Leaf, ...]:
-    return tuple(_walk(objects, definitions, materials))
-
-
-def leaves_of(scene: Scene) -> tuple[Leaf, ...]:
-    """`scene.leaves()`, the very same tuple for scenes that differ in lights, fog or the like only."""
-    return _leaves(scene.objects, scene.definitions, scene.materials)
+        yield from below(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
 
 
 def one_of(what: str, names) -> str:

@@ -14,7 +14,8 @@ from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, 
                           wide, with_sign, zero)
 from rtcore.neighbours import consecutive, load1, store1
 from rtcore.powers import floor
-from rtcore.scene import Background, Latest, Leaf, Material, invertible
+from rtcore.latest import Latest
+from rtcore.scene import Background, Leaf, Material, invertible
 from rtcore.shapes._surface import normalized
 from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
 

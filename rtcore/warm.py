@@ -39,8 +39,8 @@ def _core(dtype):
     films.note_first_hits(film, wave, n, target)
     films.commit(film, sample, n, target)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
-    films.develop(film, 8, 8, 1, pixels)
-    films.fill(film, np.zeros(0, np.int32), 8, 8, 1, node, distance, np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.uint8))
+    films.develop(film, np.zeros(0, np.int32), 8, 0, 8, 1, pixels, node, distance)
+    films.sources(film, 8, 8, 1, np.empty(64, np.int32))
 
 
 def _lens(dtype):
@@ -84,7 +84,6 @@ def _adaptive(dtype):
 
 def _recast(dtype):
     film, pixels = films.new_film(8, 8), np.zeros(0, np.int32)
-    recast.sources(film, 8, 8, 1, np.empty(64, np.int32))
     recast.cast_again(new_rays(8, dtype), 0, Camera().rays(8, 8), 8, pixels, film)
     recast.count_tests(bvh.EMPTY_TREE, 0, Camera().rays(8, 8), 8, pixels, film.distance, pixels)
 

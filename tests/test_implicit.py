@@ -150,7 +150,7 @@ def test_what_is_not_certified_is_marked_counted_and_shown():
         assert (orange == (frame.node >= 0)).all() if doubtful else not orange.any()
     flags = np.array([[1, 2, 0]], np.uint8)
     shown = draw(Seen(**{**dict.fromkeys(Seen._fields), "pixels": np.zeros((1, 3, 3), np.float32), "node": np.array([[0, -1, 0]]),
-                         "doubt": flags}))
+                         "doubt": lambda: flags}))
     assert shown[0, :, 0].tolist() == pytest.approx([0.7, 0.7, 0])
 
 

@@ -17,6 +17,7 @@ LAYERS = (
     {"rtcore.fields"},
     {"rtcore.camera"},
     {"rtcore.scene"},
+    {"rtcore.latest"},
     {"rtcore.across", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.jit", "rtcore.lanes", "rtcore.neighbours",
      "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},
     # shapes walk the tree in their kernels, so it comes before them

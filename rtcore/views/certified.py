@@ -8,7 +8,8 @@ ORANGE = np.array((1.0, 0.25, 0.0), np.float32)
 
 def draw(seen):
     shown = np.repeat(0.6 * (seen.pixels @ np.array((0.2126, 0.7152, 0.0722), np.float32))[:, :, None], 3, axis=2)
-    shown[seen.doubt != 0] = 0.3 * shown[seen.doubt != 0] + 0.7 * ORANGE
+    doubtful = seen.doubt() != 0
+    shown[doubtful] = 0.3 * shown[doubtful] + 0.7 * ORANGE
     return shown
 
 

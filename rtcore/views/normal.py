@@ -5,7 +5,7 @@ from rtcore.views.view import View
 
 
 def draw(seen):
-    shown = (0.5 + 0.5 * seen.normal) ** np.float32(2.2)
+    shown = (0.5 + 0.5 * seen.normal()) ** np.float32(2.2)
     shown[seen.node < 0] = 0
     return shown.astype(np.float32)
 

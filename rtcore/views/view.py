@@ -14,10 +14,10 @@ class Seen(NamedTuple):
     node: np.ndarray            # int32 (h, w): the leaf first hit, -1 none
     material: np.ndarray        # int32 (leaves): the number of its material
     distance: np.ndarray        # float32 (h, w): its distance from the eye, inf none
-    normal: np.ndarray          # float32 (h, w, 3): its normal, 0 none
-    doubt: np.ndarray           # uint8 (h, w): 1 where that hit lacks a proof
     count: np.ndarray           # int32 (h, w): samples so far
     # worked out only for a view that asks; arrays of its own
+    normal: Callable[[], np.ndarray]        # float32 (h, w, 3): normal of that hit
+    doubt: Callable[[], np.ndarray]         # uint8 (h, w): not 0 where that hit lacks a proof
     error: Callable[[], np.ndarray]         # float32 (h, w): estimated error, inf where unknown
     lit: Callable[[], np.ndarray]           # float32 (h, w): share of the lights that reach that hit
     coordinates: Callable[[], np.ndarray]   # float32 (h, w, 3): on a triangle the weights of its corners, else u, v, 0; 0 none
@@ -27,8 +27,8 @@ class Seen(NamedTuple):
 @dataclass(frozen=True)
 class View:
     """A name, a line of help, and `draw`, which makes a linear picture (h, w, 3) float32. One that needs no light is drawn from the
-    first hits alone, if nothing else was asked for. needs_lit: the film must
-    have noted which lights reach the first hits. kernels: the groups (`rtcore.warm`) that drawing it takes."""
+    first hits alone, if nothing else was asked for. needs_lit: the film must have noted which lights reach the first hits. kernels: the
+    groups (`rtcore.warm`) that drawing it takes."""
 
     name: str
     help: str
