@@ -75,6 +75,7 @@ WORDED = ("gallery", "shadows", "fog", "reflections")
 #: What the mouse and the fly keys do in the picture, for the shortcuts' dialog.
 MOUSE = (("Drag", "orbit around the point looked at"), ("Shift + drag, middle drag", "pan"),
          ("Wheel, right drag", "nearer or farther; the wheel toward the cursor"), ("Click", "select what is seen there"),
+         ("Ctrl + click", "focus on what is seen there, if the camera has an aperture"),
          ("Ctrl + drag", "draw a region that is refined first"),
          ("W A S D, Q E", "fly; with Shift faster"), ("Esc", "drop the region; select nothing; leave the full screen"),
          ("Up, Down in a number", "step it; Page Up and Page Down by ten"))

@@ -40,6 +40,7 @@ class Session(QObject):
     frame_changed = Signal()            # `shown` is another frame, or has another outline
     hover_changed = Signal()
     compiling_changed = Signal()
+    aiming_changed = Signal()
     said = Signal(str, str)             # level ("error", "info"), text of one line
 
     def __init__(self, worker: Worker | None = None, parent: QObject | None = None):
@@ -54,6 +55,7 @@ class Session(QObject):
         self.paused = False
         self.selection: Place | None = None
         self.under: Under | None = None
+        self.aiming = False                     # the next click in the picture tells what is to be sharp
         self.shown: Shown | None = None
         self.leaves = Leaves(self.document.scene)
         self._size, self._ratio = (0, 0), 1.0
@@ -266,6 +268,23 @@ class Session(QObject):
         direction = moves.unit(corner + x * width * right + y * height * down)
         distance = under.distance if np.isfinite(under.distance) else self.camera.distance()
         return tuple((eye + direction * distance).tolist())
+
+    def aim(self, on: bool):
+        """Let the next click in the picture tell what is to be sharp; or no longer."""
+        if on != self.aiming:
+            self.aiming = on
+            self.aiming_changed.emit()
+
+    def focus(self, x: float, y: float):
+        """Focus on what is seen at (x, y); a step of the view's history."""
+        self.aim(False)
+        under = self.place_under(x, y)
+        if under is None or not np.isfinite(under.distance):
+            self.said.emit("info", "There is nothing to focus on: the view goes past everything there.")
+            return
+        self._try_move(moves.focus_on, self.point_under(x, y), gesture=None)
+        if self.camera.aperture == 0:
+            self.said.emit("info", f"In focus at {self.camera.focus:.4g}. All is sharp until the camera has an aperture.")
 
     def pick(self, x: float, y: float):
         """Select what is seen at (x, y), or nothing where nothing is hit."""

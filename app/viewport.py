@@ -46,9 +46,11 @@ class Viewport(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 120)
         self.setAccessibleName("Picture of the scene")
-        self.setAccessibleDescription("Drag to orbit, Shift and drag to pan, wheel to move nearer, click to select, W A S D Q E to fly")
+        self.setAccessibleDescription("Drag to orbit, Shift and drag to pan, wheel to move nearer, click to select, "
+                                      "Control and click to focus, W A S D Q E to fly")
         session.frame_changed.connect(self._show_frame)
         session.options_changed.connect(self.update)
+        session.aiming_changed.connect(self._point)
 
     def sizeHint(self) -> QSize:
         return QSize(900, 650)
@@ -132,8 +134,13 @@ class Viewport(QWidget):
 
     def _ask(self, on: bool):
         self.asking = on
-        self.setCursor(Qt.CursorShape.CrossCursor) if on else self.unsetCursor()
+        self._point()
         self.asking_changed.emit()
+
+    @Slot()
+    def _point(self):
+        """The cursor tells whether something is to be pointed at."""
+        self.setCursor(Qt.CursorShape.CrossCursor) if self.asking or self._session.aiming else self.unsetCursor()
 
     def _stretch(self, start: QPointF, end: QPointF):
         """The marquee is drawn from one point of the widget to another."""
@@ -188,6 +195,8 @@ class Viewport(QWidget):
         elif self._gesture is None and event.button() == Qt.MouseButton.LeftButton:
             if self.asking:
                 self.ask_region(False)
+            elif self._session.aiming or event.modifiers() & Qt.KeyboardModifier.ControlModifier:
+                self._session.focus(*self._at(event.position()))
             else:
                 self._session.pick(*self._at(event.position()))
         self._press = self._gesture = None
@@ -215,6 +224,8 @@ class Viewport(QWidget):
                     self._gesture = ("flight", next(_gestures))
                 self._held.add(event.key())
                 self._flying.start()
+        elif event.key() == Qt.Key.Key_Escape and self._session.aiming:
+            self._session.aim(False)
         elif event.key() == Qt.Key.Key_Escape and (self.asking or self._session.options.region is not None):
             self.ask_region(False)
         elif event.key() == Qt.Key.Key_Escape and self._session.selection is not None:

@@ -156,6 +156,11 @@ def dolly(camera: Camera, factor: float, toward: Vec | None = None) -> Camera:
     return camera.at(lookfrom=nearer(camera.lookfrom), lookat=nearer(camera.lookat))
 
 
+def focus_on(camera: Camera, point: Vec) -> Camera:
+    """The camera with the plane through `point`, across the view, in focus; FieldError for a point that is not before the eye."""
+    return camera.at(focus=float(camera.basis()[2] @ np.subtract(point, camera.lookfrom)))
+
+
 def fly(camera: Camera, right: float, up: float, forward: float) -> Camera:
     """Eye and lookat moved along the view's axes, in scene units."""
     u, v, w = camera.basis()

@@ -33,6 +33,10 @@ class CameraPanel(Panel):
         everything = button("Frame all", "Draw back until everything is in the picture (Home)", session.frame_all)
         chosen = button("Frame selection", "Draw back until the selected node fills the picture (F)", session.frame_selection)
         reset = button("Reset view", "The camera that the file came with (Ctrl+Home)", session.reset_view)
+        self.focus = button("Focus by click", "Then click in the picture on what is to be sharp, or Esc; the same as Ctrl and click",
+                            lambda: session.aim(not session.aiming))
+        self.focus.setCheckable(True)
+        self.column.addWidget(self.focus)
         views, frames = QHBoxLayout(), QHBoxLayout()
         for row, widgets in ((views, (self.back, self.forward, reset)), (frames, (everything, chosen))):
             row.setSpacing(6)
@@ -46,6 +50,7 @@ class CameraPanel(Panel):
         self.section.toggled.connect(self.refresh)
         session.camera_changed.connect(self.refresh)
         session.frame_changed.connect(self._frame)
+        session.aiming_changed.connect(self._aiming)
         self.refresh()
 
     def dress(self, theme: Theme):
@@ -53,10 +58,15 @@ class CameraPanel(Panel):
         self.forward.setIcon(icon("forward", theme))
 
     @Slot()
+    def _aiming(self):
+        self.focus.setChecked(self.session.aiming)
+
+    @Slot()
     def refresh(self):
         """Show the session's camera."""
         self.form.refresh()
         self.form.setEnabled(self.session.camera is not None)
+        self.focus.setEnabled(self.session.camera is not None)
         self.back.setEnabled(self.session.views.can_back)
         self.forward.setEnabled(self.session.views.can_forward)
         self._frame()
