@@ -1,10 +1,10 @@
-"""Steps of rays that are walked in turns, without a branch: which children a ray meets, which of them first, and whether the next is a
-leaf, no processor guesses, and each wrong guess costs as much as the step itself.
+"""Steps of rays that scatter, without a branch: which children a ray meets, which of them first, and whether the next is a leaf, no
+processor guesses, and each wrong guess costs as much as the step itself.
 """
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic, models, register_model
 
 from rtcore.lanes import F32, I8, MASK
 
@@ -55,57 +55,70 @@ def push(tc, stack, slot, top, at, link, row, met):
 
 
 @intrinsic
-def prefetch_either(tc, which, x, i, y, j):
-    """Have the processor fetch the first four cache lines of row i of x if `which`, else of row j of y, which will be read soon. x and y:
-    2-D, C-contiguous."""
+def prefetch_either(tc, which, x, i, y, z, j):
+    """Have the processor fetch what will be read soon: the first four cache lines of row i of x if `which`, else the first two of row j of
+    y and of row j of z. All 2-D, C-contiguous."""
     def gen(ctx, b, sig, args):
-        def place(k):
+        def place(k, row):
             array = ctx.make_array(sig.args[k])(ctx, b, args[k])
             columns = cgutils.unpack_tuple(b, array.shape)[1]
-            return b.bitcast(b.gep(array.data, [b.mul(args[k + 1], columns)]), ir.IntType(8).as_pointer())
-        p = b.select(args[0], place(1), place(3))
-        t = ir.FunctionType(ir.VoidType(), [p.type, I32, I32, I32])
+            return b.bitcast(b.gep(array.data, [b.mul(row, columns)]), I8.as_pointer())
+        node, first, second = place(1, args[2]), place(3, args[5]), place(4, args[5])
+        t = ir.FunctionType(ir.VoidType(), [node.type, I32, I32, I32])
         function = cgutils.get_or_insert_function(b.module, t, "llvm.prefetch.p0i8")
         for line in range(4):
-            b.call(function, [b.gep(p, [I32(64 * line)]), I32(0), I32(3), I32(1)])
+            other = b.gep(first if line < 2 else second, [I32(64 * (line % 2))])
+            b.call(function, [b.select(args[0], b.gep(node, [I32(64 * line)]), other), I32(0), I32(3), I32(1)])
         return ctx.get_dummy_value()
-    return types.void(types.boolean, x, types.intp, y, types.intp), gen
+    return types.void(types.boolean, x, types.intp, y, z, types.intp), gen
 
 
-def _bytes(ctx, b, t, array):
-    """Pointer to 64 bytes."""
-    return b.bitcast(ctx.make_array(t)(ctx, b, array).data, ir.VectorType(I8, 64).as_pointer())
+class Sets(types.Type):
+    """Eight sets of up to 64 rays, one for each child of a node: eight int64, bit k for ray k."""
+
+    def __init__(self):
+        super().__init__("sets")
 
 
-def _set(b, vector):
-    """The bits of a vector's numbers other than 0, as an int64."""
-    count = vector.type.count
-    found = b.bitcast(b.icmp_signed("!=", vector, ir.Constant(vector.type, [0] * count)), ir.IntType(count))
-    return found if count == 64 else b.zext(found, I64)
+SETS = Sets()
+WIDE = ir.VectorType(I64, 8)
+
+
+@register_model(Sets)
+class SetsModel(models.PrimitiveModel):
+    def __init__(self, dmm, fe):
+        super().__init__(dmm, fe, WIDE)
 
 
 @intrinsic
-def forget(tc, met):
-    """Set an array of 64 bytes to 0."""
+def empty_sets(tc):
+    """Sets with no ray in them."""
+    return SETS(), lambda ctx, b, sig, a: ir.Constant(WIDE, [0] * 8)
+
+
+@intrinsic
+def joined(tc, sets, mask, ray):
+    """The sets after a ray, given as an int64 with its bit, has joined those of the mask."""
     def gen(ctx, b, sig, a):
-        b.store(ir.Constant(ir.VectorType(I8, 64), [0] * 64), _bytes(ctx, b, met, a[0]), align=1)
+        bit = b.insert_element(ir.Constant(WIDE, ir.Undefined), a[2], I32(0))
+        bit = b.shuffle_vector(bit, bit, ir.Constant(ir.VectorType(I32, 8), [0] * 8))
+        return b.select(a[1], b.or_(a[0], bit), a[0])
+    return SETS(sets, mask, types.int64), gen
+
+
+@intrinsic
+def keep(tc, array, sets):
+    """array[0 .. 7] = the sets; int64 array."""
+    def gen(ctx, b, sig, a):
+        b.store(a[1], b.bitcast(ctx.make_array(array)(ctx, b, a[0]).data, WIDE.as_pointer()), align=8)
         return ctx.get_dummy_value()
-    return types.void(met), gen
+    return types.void(array, sets), gen
 
 
 @intrinsic
-def which(tc, met, k):
-    """An int64 with the bits set of those of 64 bytes that have bit k."""
-    def gen(ctx, b, sig, a):
-        bit = b.shl(I8(1), b.trunc(a[1], I8))
-        t = ir.VectorType(I8, 64)
-        bit = b.insert_element(ir.Constant(t, ir.Undefined), bit, I32(0))
-        bit = b.shuffle_vector(bit, bit, ir.Constant(ir.VectorType(I32, 64), [0] * 64))
-        return _set(b, b.and_(b.load(_bytes(ctx, b, met, a[0]), align=1), bit))
-    return types.int64(met, types.intp), gen
-
-
-@intrinsic
-def octets(tc, mask):
+def octets(tc, rays):
     """Which of the eight bytes of an int64 are not 0, the lowest as bit 0."""
-    return types.int64(types.int64), lambda ctx, b, sig, a: _set(b, b.bitcast(a[0], ir.VectorType(I8, 8)))
+    def gen(ctx, b, sig, a):
+        parts = b.bitcast(a[0], ir.VectorType(I8, 8))
+        return b.zext(b.bitcast(b.icmp_signed("!=", parts, ir.Constant(parts.type, [0] * 8)), I8), I64)
+    return types.int64(types.int64), gen

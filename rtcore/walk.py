@@ -17,7 +17,7 @@ from rtcore.across import largest, lowest_bit, smallest
 from rtcore.bvh import LINK, NO_CHILD, NODE, ORDER, STACK, WIDTH
 from rtcore.jit import inline, inline_new
 from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, load3, narrow, select, size, splat, store, vec3, with_sign)
-from rtcore.turns import forget, octets, prefetch_either, push, which
+from rtcore.turns import empty_sets, joined, keep, octets, prefetch_either, push
 from rtcore.wave import DX, OX, START, T
 
 PACKET = 64
@@ -55,7 +55,7 @@ class Walk(NamedTuple):
     mask: np.ndarray    # int64 (most): the vectors that wait for a node; of SOME rays, the rays
     slots: np.ndarray   # int64 (slots, 2): the ray, -1 none any more; how many nodes wait
     near: np.ndarray    # float32 (1, 8): where the children of a node are
-    met: np.ndarray     # uint8 (64): which children of a node each ray meets
+    met: np.ndarray     # int64 (8): which rays meet each child of a node
     state: np.ndarray   # int64, as named above
 
 
@@ -65,7 +65,7 @@ def new_walk(rays):
     coarse = np.empty((16, PACKET), np.float32)
     return Walk(coarse, np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32), coarse.view(np.int32),
                 np.empty((SLOTS, STACK + WIDTH), np.int64), np.empty((1, STACK), np.int32), np.empty((1, STACK), np.float32),
-                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(PACKET, np.uint8),
+                np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(WIDTH, np.int64),
                 np.empty(8, np.int64))
 
 
@@ -241,7 +241,7 @@ def next_leaf(walk, tree, table):
     if mode == ALONE:
         walk.state[TOP] -= 1
         return -1 - np.int64(tree.link[LINK, 0]) if walk.state[TOP] == 0 else -1
-    return _next_of_some(walk, tree) if mode == SOME else _next_of_ray(walk, tree, table)
+    return _next_of_some(walk, tree, table) if mode == SOME else _next_of_ray(walk, tree, table)
 
 
 @inline
@@ -307,43 +307,44 @@ def _next_of_ray(walk, tree, table):
         top += push(keys, slot, top, enter, link, row + LINK, enter <= least(least(u, v), least(w, coarse[REACH, ray])))
         slots[slot, 1] = top
         child = np.int64(np.int32(keys[slot, max(top - 1, 0)]))
-        prefetch_either(child >= 0, box, NODE * child, table.data, leaf_first(-1 - child))
+        prefetch_either(child >= 0, box, NODE * child, table.data, table.exact, leaf_first(-1 - child))
     state[TOP], state[RUNNING], state[WAITING] = slot, running, waiting
     return -1
 
 
 @inline
-def _next_of_some(walk, tree):
+def _next_of_some(walk, tree, table):
     """Rays that scatter, all of which that meet a node together: each against its eight children at once."""
     coarse, stack, mask, met, state = walk.coarse, walk.stack, walk.mask, walk.met, walk.state
     box, link = tree.box, tree.link
     top, octant = state[TOP], state[OCTANT]
     while top > 0:
         top -= 1
-        node, rays = np.int64(stack[0, top]), mask[top]
+        node, rays, below = np.int64(stack[0, top]), mask[top], np.int64(stack[0, max(top - 1, 0)])
+        prefetch_either(below >= 0, box, NODE * below, table.data, table.exact, leaf_first(-1 - below))
         if node < 0:
             state[TOP], state[ACTIVE] = top, octets(rays)
             return -1 - node
         row = node << 3
         x0, y0, z0 = load(box, row, 0), load(box, row + 1, 0), load(box, row + 2, 0)
         x1, y1, z1 = load(box, row + 3, 0), load(box, row + 4, 0), load(box, row + 5, 0)
-        forget(met)
+        sets = empty_sets()
         while rays:
-            j = lowest_bit(rays)
-            rays &= rays - 1
+            j, bit = lowest_bit(rays), rays & -rays
+            rays ^= bit
             ix, iy, iz = coarse[INVERSE, j], coarse[INVERSE + 1, j], coarse[INVERSE + 2, j]
             a, u = fma(x0, ix, coarse[LOWS, j]), fma(x1, ix, coarse[HIGHS, j])
             b, v = fma(y0, iy, coarse[LOWS + 1, j]), fma(y1, iy, coarse[HIGHS + 1, j])
             c, w = fma(z0, iz, coarse[LOWS + 2, j]), fma(z1, iz, coarse[HIGHS + 2, j])
             near = greatest(greatest(least(a, u), least(b, v)), greatest(least(c, w), np.float32(0)))
             far = least(least(greatest(a, u), greatest(b, v)), least(greatest(c, w), coarse[REACH, j]))
-            met[j] = bits(near <= far)
+            sets = joined(sets, near <= far, bit)
+        keep(met, sets)
         order = np.int64(link[row + ORDER, octant]) & 0xFFFFFFFF | NO_CHILD << 32      # eight leave no room for the end
         while order & 15 != NO_CHILD:
             k = order & 15
-            some = which(met, k)
-            stack[0, top], mask[top] = link[row + LINK, k], some
-            top += some != 0
+            stack[0, top], mask[top] = link[row + LINK, k], met[k]
+            top += met[k] != 0
             order >>= 4
     state[TOP] = 0
     return -1
