@@ -16,7 +16,7 @@ THUMBNAILS = resources.ROOT / "thumbnails"
 FIRST_SCENE = GALLERY / "whitted.yaml"
 
 SIZE = 480, 300     # of a thumbnail in pixels: sharp at twice the size it is shown at
-SAMPLES = 16
+SAMPLES = 64
 QUALITY = 86        # of the JPEG: some 30 kB each
 
 #: The keys at the top of a scene file that say what it is, with all that is indented below them.

@@ -27,7 +27,7 @@ def stem(request) -> str:
 
 def test_the_gallery_has_the_scenes_that_were_promised():
     promised = {"barth-sextic", "blobs", "candle", "chess", "coloured-fog", "fog-depth", "gyroid", "heart", "koppelaarster", "quadrics",
-                "rembrandt", "snail", "solids", "spheres", "tori", "transformed-spheres", "whitted"}
+                "rembrandt", "snail", "solids", "spheres", "studio", "tori", "transformed-spheres", "whitted"}
     assert promised <= {path.stem for path in GALLERY}
 
 
