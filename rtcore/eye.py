@@ -56,18 +56,20 @@ def cast(wave, target, view, tile, sample, seed):
     n, places = 0, _new_places()
     for by in range(0, rows, 8):
         for bx in range(0, columns, 8):
-            for j in range(by, min(by + 8, rows)):
-                for i in range(bx, min(bx + 8, columns)):
-                    if skip and (x0 + i) % 2 == 0 and (y0 + j) % 2 == 0:
+            # whole rows before those with gaps: eight neighbours are noted in the film at once
+            for gaps in range(1 + skip):
+                for j in range(by, min(by + 8, rows)):
+                    if skip and (y0 + j) % 2 == gaps:
                         continue
-                    x, y = (x0 + i) * spacing, (y0 + j) * spacing
-                    if x >= width or y >= height:
-                        continue
-                    u, v = jitter(y * width + x, sample, seed)
-                    _put(wave, n, target, places, y * width + x, u + x, v + y)
-                    n += 1
-                    if n & 7 == 0:
-                        _aim(wave, n - 8, places, view)
+                    for i in range(bx, min(bx + 8, columns)):
+                        x, y = (x0 + i) * spacing, (y0 + j) * spacing
+                        if gaps and (x0 + i) % 2 == 0 or x >= width or y >= height:
+                            continue
+                        u, v = jitter(y * width + x, sample, seed)
+                        _put(wave, n, target, places, y * width + x, u + x, v + y)
+                        n += 1
+                        if n & 7 == 0:
+                            _aim(wave, n - 8, places, view)
     if n & 7:
         _aim(wave, n & -8, places, view)
     finish(wave.rays, n)

@@ -100,7 +100,9 @@ def note_lit(film, beam, n, target, share):
     """Add to the pixels `target` of a first wave its share for each of the beam's n rays that reached its light, or what came through."""
     for j in range(n):
         if beam.rays.prim[j] < 0:
-            film.lit[target[beam.owner[j]]] += share * np.float32(np.exp(-beam.rays.depth[j] * DEPTH_UNIT))
+            depth = beam.rays.depth[j]
+            through = np.float32(1) if depth == 0 else np.float32(np.exp(-depth * DEPTH_UNIT))
+            film.lit[target[beam.owner[j]]] += share * through
 
 
 @kernel

@@ -37,6 +37,7 @@ class Level:
         self.source, self.prim, self.t, self.doubt = source, prim, t, doubt
         self.boxes = NO_BOXES
         self.whole = True                           # no hit is UNKNOWN
+        self.noted = False                          # the film has noted them
         self.shades: dict[tuple, Shade] = {}        # by what makes a light's shadows
 
     @property
@@ -158,6 +159,11 @@ class Memory:
         """Whether something is kept of all these tiles."""
         return all(tile.tobytes() in self.tiles for tile in tiles)
 
+    def forget_film(self) -> None:
+        """There is another film, which has noted nothing."""
+        for levels in self.tiles.values():
+            levels[0].noted = False
+
     def forget_onward(self) -> None:
         """Drop what reflected and refracted rays met."""
         for levels in self.tiles.values():
@@ -175,8 +181,9 @@ class Memory:
         moved = (number != np.arange(len(number))).any()
         for levels in self.tiles.values():
             for level in levels:
-                if moved and _renumber(level.prim, number):
-                    level.whole = False
+                if moved:
+                    level.noted = False
+                    level.whole &= not _renumber(level.prim, number)
                 level.boxes = np.concatenate([level.boxes, boxes])
                 if len(level.boxes) > BOXES:
                     self.tiles.clear()
@@ -245,6 +252,15 @@ class Recall:
     def kept(self) -> list[Level]:
         """All that is known of the tile now; of waves that were not wanted this time, what was known before."""
         return self.levels + (self._kept[len(self.levels):] if self._was is None else [])
+
+    @property
+    def noted(self) -> bool:
+        """Whether the film has noted the first wave's hits."""
+        return self.levels[0].noted
+
+    def note_film(self) -> None:
+        """Now it has."""
+        self.levels[0].noted = True
 
     def shadows(self, beam: Beam, key: tuple, first: int, last: int) -> int:
         """Give one light's rays, columns first .. last - 1, what is known of their way; returns how many have to be traced."""

@@ -92,6 +92,8 @@ class Render:
         signed = self.gain < 1
         reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit, signed)
         self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit, signed)
+        if not reused and self.memory is not None:
+            self.memory.forget_film()
         if reused and not goes_on:
             films.clear(self.film)
         if before is not None and len(before.scratches) == threads and before.tracer.geometry.dtype == geometry.dtype:

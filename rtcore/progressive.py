@@ -29,7 +29,7 @@ from rtcore.schedule import COARSEST, passes, tiles
 from rtcore.settings import Settings
 from rtcore.trace import NONFINITE
 
-KNOWN = 0.05        # seconds within which a picture of known hits is wanted whole
+KNOWN = 0.08        # seconds that a picture of known hits may take and still come whole, not lattice by lattice
 MARGIN = 1e-5       # by which boxes are made larger, of their corners' coordinates: shapes are rounded to float32
 
 

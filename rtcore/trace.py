@@ -199,13 +199,7 @@ class Tracer:
         self.hit(clock, wave, n, counts, first)
         counts[PRIMARY_HITS] += np.count_nonzero(wave.rays.prim[:n] >= 0)
         if first is not None:
-            self.run(films.note_first_hits, film, wave, n, scratch.target)
-            if len(film.lit):       # what a tile that was given up has noted does not count
-                film.lit[scratch.target[:n]] = 0
-            for group in self.geometry.groups:
-                if group.kind in DOUBTFUL:
-                    films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
-            clock.lap("film", "core")
+            self._note(scratch, film, wave, n, first.recall)
         if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, first):
             return False
         if len(film.plain):
@@ -217,6 +211,19 @@ class Tracer:
         clock.lap("film", "core")
         scratch.counts += counts
         return True
+
+    def _note(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, recall: Recall | None) -> None:
+        """Note on the film what first samples hit, unless it is there from before."""
+        if len(film.lit):       # what a tile that was given up has noted does not count
+            film.lit[scratch.target[:n]] = 0
+        if recall is None or not recall.noted:
+            self.run(films.note_first_hits, film, wave, n, scratch.target)
+            for group in self.geometry.groups:
+                if group.kind in DOUBTFUL:
+                    films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
+        if recall is not None:
+            recall.note_film()
+        scratch.clock.lap("film", "core")
 
     def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale, first: First | None) -> bool:
         """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
