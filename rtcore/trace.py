@@ -23,6 +23,7 @@ from rtcore.shapes import DOUBTFUL
 from rtcore.wave import NO_ANSWER, Beam, Wave, new_beam, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
+LEVEL = 1 << 12         # pairs of dimensions for the lights of one depth: so a light more changes nothing about the others
 SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
 
 #: Columns of Scratch.counts.
@@ -287,7 +288,7 @@ class Tracer:
         beam = scratch.beams(n, together)
         self.run(shading.glow, wave, n, self.look, beam.answer)
         clock.lap(GLOW, "glow")
-        pairs = LIGHTS + depth * len(self.lamps)
+        pairs = LIGHTS + depth * LEVEL
         for k in range(0, len(self.lamps), together):
             m, lamps, ends = 0, self.lamps[k:k + together], [0]
             for j, lamp in enumerate(lamps, k):
