@@ -184,11 +184,11 @@ class Swatch(QToolButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def paintEvent(self, event):
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(self.palette().accent().color() if self.hasFocus() or self.underMouse() else self.palette().mid().color())
-        painter.setBrush(self.color if self.isEnabled() else self.palette().window())
-        painter.drawRoundedRect(self.rect().adjusted(1, 1, -2, -2), 4, 4)
+        with QPainter(self) as painter:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setPen(self.palette().accent().color() if self.hasFocus() or self.underMouse() else self.palette().mid().color())
+            painter.setBrush(self.color if self.isEnabled() else self.palette().window())
+            painter.drawRoundedRect(self.rect().adjusted(1, 1, -2, -2), 4, 4)
 
     def event(self, event):
         if event.type() in (QEvent.Type.Enter, QEvent.Type.Leave):

@@ -1,5 +1,6 @@
 """Forms made from records: the fields say what they hold, the form picks the editors. No panel lists a field twice."""
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 
 import msgspec
 from PySide6.QtCore import Qt, Signal
@@ -106,22 +107,30 @@ class Form(QWidget):
 
 class RecordForm(Form):
     """The fields of one record, or `only` some in that order. `read` gives the record as it is now, `commit(record, label, merge)`
-    takes the changed one."""
+    takes the changed one. With `slowly` the form starts empty and each step of the iterator `rows` adds a row, some 1 ms of work."""
 
     def __init__(self, read: Callable[[], Record], commit: Callable[[Record, str, object], None], seal: Callable[[], None],
-                 only: tuple[str, ...] | None = None, skip: tuple[str, ...] = (), editors: dict[str, Editor] | None = None):
+                 only: tuple[str, ...] | None = None, skip: tuple[str, ...] = (), editors: dict[str, Editor] | None = None,
+                 slowly: bool = False):
         super().__init__()
-        record = read()
+        self._read, self._commit, self._seal = read, commit, seal
+        self.rows = self._add_rows(only, skip, editors or {})
+        if not slowly:
+            deque(self.rows, maxlen=0)
+
+    def _add_rows(self, only: tuple[str, ...] | None, skip: tuple[str, ...], editors: dict[str, Editor]) -> Iterator[None]:
+        record = self._read()
         fields = fields_of(type(record))
         for name in only or fields:
             field = fields[name]
-            if name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color) and name not in (editors or {})):
+            if name in skip or (isinstance(field, Maybe) and not isinstance(field.inner, Color) and name not in editors):
                 continue
             value = getattr(record, name)
-            editor = (editors or {}).get(name) or editor_for(field, value)
-            self.add(name, editor, tip_of(field), lambda name=name: getattr(read(), name),
-                     lambda value, name=name: changed(read(), name, value),
-                     lambda made, merge, name=name: commit(made, title_of(name).lower(), merge), seal)
+            editor = editors.get(name) or editor_for(field, value)
+            self.add(name, editor, tip_of(field), lambda name=name: getattr(self._read(), name),
+                     lambda value, name=name: changed(self._read(), name, value),
+                     lambda made, merge, name=name: self._commit(made, title_of(name).lower(), merge), self._seal)
+            yield
 
 
 def changed(record: Record, name: str, value: object) -> Record:

@@ -7,6 +7,10 @@ import threading
 import traceback
 from pathlib import Path
 
+#: Seconds after which the window's thread gets Python's lock from one that computes. It asks for it after each of Qt's calls that let it
+#: go, dozens in an event: with Python's own 5 ms an event could take 60 ms while the renderer prepared a scene.
+SWITCH = 0.0001
+
 #: What Qt's window plugin on X11 loads, and the Debian package that has it. Without one of them Qt aborts the process.
 XCB = {"libxcb-cursor.so.0": "libxcb-cursor0", "libxcb-icccm.so.4": "libxcb-icccm4", "libxcb-image.so.0": "libxcb-image0",
        "libxcb-keysyms.so.1": "libxcb-keysyms1", "libxcb-randr.so.0": "libxcb-randr0", "libxcb-render-util.so.0": "libxcb-render-util0",
@@ -57,6 +61,7 @@ def run(path: str | None) -> int:
         print(f"rayscope: Qt can't be loaded: {error}", file=sys.stderr)
         return 1
     from app.gallery import FIRST_SCENE
+    from app.garbage import Garbage
     from app.session import Session
     from app.settings import Preferences
     from app.window import Window
@@ -66,11 +71,13 @@ def run(path: str | None) -> int:
     app.setApplicationName("rayscope")
     app.setApplicationDisplayName("Rayscope")
     app.setDesktopFileName("rayscope")
+    sys.setswitchinterval(SWITCH)
     session = Session()
     hook = sys.excepthook, threading.excepthook
     sys.excepthook = lambda kind, error, trace: report(session, error)
     threading.excepthook = lambda args: report(session, args.exc_value)
     window = Window(session, Preferences())
+    Garbage(session, window.filing)
     window.show()
     signal.signal(signal.SIGINT, signal.SIG_DFL)     # Ctrl-C in the terminal ends the program; Qt's loop would never look
     window.filing.open(Path(path) if path is not None else FIRST_SCENE, instead=FIRST_SCENE)

@@ -86,7 +86,10 @@ class Viewport(QWidget):
         return QRectF((self.width() - width) / 2, 0, width, self.height())
 
     def paintEvent(self, event):
-        painter = QPainter(self)
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter):
         if self._image is None:
             painter.fillRect(self.rect(), QColor(self._theme.stage))
             return

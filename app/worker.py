@@ -1,4 +1,5 @@
 """The render worker: owns the one render thread, runs the latest job, and keeps the newest frame for whoever paints."""
+import os
 import sys
 import threading
 import time
@@ -16,6 +17,7 @@ from app.outline import Outline, trace_outline
 if TYPE_CHECKING:
     from rtcore.progressive import Frame
 
+NICE = 5            # by how much the window's thread goes before those that trace, where all processors are busy
 PATIENCE = 1.0      # s that a step of a drag may take to its first pass though a newer step waits; else a fast drag would show nothing
 
 
@@ -98,6 +100,8 @@ class Worker(QObject):
 
     def _run(self):
         engine = None
+        if sys.platform == "linux":
+            os.nice(NICE)       # there, of this thread and those that it starts: the picture's
         try:
             engine = self._factory()
             while (job := self._await_job()) is not None:

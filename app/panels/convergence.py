@@ -1,4 +1,5 @@
 """The convergence panel: the error of the picture against time, as it falls, beside runs that were pinned."""
+import importlib
 from pathlib import Path
 
 from PySide6.QtCore import QSize, QTimer, Slot
@@ -26,6 +27,7 @@ class ConvergencePanel(Panel):
         super().__init__(session, parent)
         self._theme: Theme = DARK
         self._figure = None
+        self._plotting: str | None = None       # "loading", then "loaded"
         self.run: Run | None = None
         self.pinned: list[Run] = []
         self.referring = referring or Referring()
@@ -143,7 +145,12 @@ class ConvergencePanel(Panel):
 
     @Slot()
     def _draw(self):
-        from app import curves, plots       # pyqtgraph is not needed before
+        if self._plotting != "loaded":
+            if self._plotting is None:
+                self._plotting = "loading"      # pyqtgraph: 0.4 s, so on a thread
+                self.session.tasks.run(lambda: importlib.import_module("app.curves"), self._plots_loaded, name="plots")
+            return
+        from app import curves, plots
         if self._figure is None:
             self._figure = curves.ErrorFigure(plots.on_screen(self._theme))
             self._figure.setMinimumHeight(220)
@@ -153,6 +160,10 @@ class ConvergencePanel(Panel):
         for row, name in enumerate(names(self.runs())[:len(self.pinned)]):      # as the plot has them
             self.pins.item(row).setText(name)
             self.pins.item(row).setForeground(QColor(self._figure.style_.color(row)))
+
+    def _plots_loaded(self, _):
+        self._plotting = "loaded"
+        self._draw_soon()
 
     def _curves(self) -> list:
         from app import curves

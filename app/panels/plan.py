@@ -49,7 +49,11 @@ class Bars(QWidget):
         return max((self.fontMetrics().horizontalAdvance(name) for name, *_ in self.rows), default=0)
 
     def paintEvent(self, _):
-        painter, theme = QPainter(self), self._theme
+        with QPainter(self) as painter:
+            self._paint(painter)
+
+    def _paint(self, painter: QPainter):
+        theme = self._theme
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         numbers = self.fontMetrics().horizontalAdvance("100 %")
         left = self._names() + self.GAP

@@ -1,8 +1,10 @@
 """The property editor: forms made from the fields of whatever is selected."""
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
 
 import msgspec
-from PySide6.QtCore import Qt, Slot
+from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from app.editors import FlagEdit
@@ -18,10 +20,12 @@ from rtcore.scene import DEFAULT_MATERIAL, Checker, Material, Matrix, Node, Rota
 NEW_TRANSFORMS = (Translate((0, 0, 0)), Rotate((0, 1, 0), 0), Scale((1, 1, 1)), Shear(),
                   Matrix(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))))
 INHERITED, OWN = "inherited", "own"
+SLICE = 0.002       # s of building at a time: a node's forms take 20 to 40 ms, in which the picture could not be moved
 
 
 class PropertiesPanel(Panel):
-    """Rebuilt when another kind of thing is selected; while its structure stays, only the values are shown anew."""
+    """Rebuilt when another kind of thing is selected, row by row between other events; while its structure stays, only the values are
+    shown anew."""
 
     title, icon, tip = "Properties", "properties", "Everything about what is selected"
 
@@ -29,6 +33,9 @@ class PropertiesPanel(Panel):
         super().__init__(session, parent)
         self._theme: Theme = DARK
         self._built: object = None
+        self._rest: Iterator[None] = iter(())       # what is still to be built
+        self._soon = QTimer(self, interval=0)
+        self._soon.timeout.connect(self._build_on)
         self.forms: dict[str, Form] = {}
         self._pickers: list[MaterialPicker] = []
         session.document.changed.connect(self.refresh)
@@ -47,7 +54,9 @@ class PropertiesPanel(Panel):
         structure = (place, self._structure(record))
         if structure != self._built:
             self._built = structure
-            self._build(place, record)
+            self._clear()
+            self._rest = self._build(place, record)
+            self._build_on()
         for form in self.forms.values():
             form.refresh()
         for picker in self._pickers:
@@ -67,46 +76,64 @@ class PropertiesPanel(Panel):
         """The material that a node names or has of its own."""
         return self.session.scene.materials[node.material] if isinstance(node.material, str) else node.material
 
-    # building
+    def complete(self):
+        """Build what is still to be built."""
+        deque(self._rest, maxlen=0)
 
-    def _build(self, place: Place | None, record: Record | None):
+    # building: generators, a step of which is some 1 ms of work
+
+    @Slot()
+    def _build_on(self):
+        until = time.perf_counter() + SLICE
+        while time.perf_counter() < until:
+            if next(self._rest, self) is self:
+                self.widget().setUpdatesEnabled(True)
+                return self._soon.stop()
+        self.widget().setUpdatesEnabled(False)      # what was there is seen until all of the new is
+        self._soon.start()
+
+    def _clear(self):
         while (item := self.column.takeAt(0)) is not None:
             if item.widget() is not None:
                 item.widget().hide()
                 item.widget().deleteLater()
+        self.column.addStretch(1)
         self.forms, self._pickers = {}, []
+
+    def _build(self, place: Place | None, record: Record | None) -> Iterator[None]:
         if record is None:
             self._add_hint("Click an object in the picture or in the scene tree to see and change its properties.")
         elif isinstance(record, Node):
-            self._build_node(place, record)
+            yield from self._build_node(place, record)
         else:
             title = label_of(self.session.scene, place)
             self._add_hint(title if place.kind == "background" else f"{type(record).__name__} “{title}”")
-            form = RecordForm(lambda: record_at(self.session.scene, place), self._commit(place), self.session.seal)
-            self._add("record", form)
+            form = RecordForm(lambda: record_at(self.session.scene, place), self._commit(place), self.session.seal, slowly=True)
+            yield from self._add("record", form)
             if isinstance(record, Material):
-                self._build_checker(lambda: record_at(self.session.scene, place), self._commit(place), form)
-        self.column.addStretch(1)
+                yield from self._build_checker(lambda: record_at(self.session.scene, place), self._commit(place), form)
 
-    def _build_node(self, place: Place, node: Node):
+    def _build_node(self, place: Place, node: Node) -> Iterator[None]:
         def read() -> Node:
             return record_at(self.session.scene, place)
         commit = self._commit(place)
         if (name := definition_around(self.session.scene, place.key)) is not None:
             self._add_hint(f"Part of the definition “{name}”: a change shows in every use of it.")
-        self._add("node", RecordForm(read, commit, self.session.seal, only=("name", "visible", "note")))
+        yield from self._add("node", RecordForm(read, commit, self.session.seal, only=("name", "visible", "note"), slowly=True))
         if node.shape is not None:
             def commit_shape(shape, label, merge):
                 commit(msgspec.structs.replace(read(), shape=shape), label, merge)
-            self._add("shape", RecordForm(lambda: read().shape, commit_shape, self.session.seal), type(node.shape).__name__)
-        self._build_transforms(read, commit)
-        self._build_material(read, commit)
+            form = RecordForm(lambda: read().shape, commit_shape, self.session.seal, slowly=True)
+            yield from self._add("shape", form, type(node.shape).__name__)
+        yield from self._build_transforms(read, commit)
+        yield from self._build_material(read, commit)
 
-    def _build_transforms(self, read: Callable[[], Node], commit: Callable):
+    def _build_transforms(self, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
         body = QWidget()
         column = QVBoxLayout(body)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
+        self._place(Section("Transform", body, opened=bool(read().transform)))
 
         def put(i: int, transform, label: str, merge: object):
             commit(msgspec.structs.replace(read(), transform=spliced(read().transform, i, transform)), label, merge)
@@ -125,9 +152,11 @@ class PropertiesPanel(Panel):
             remove = f"Remove this {kind.lower()}"
             head.addWidget(small_button(icon("close", self._theme), remove, remove, lambda i=i: drop(i)))
             column.addLayout(head)
-            form = RecordForm(lambda i=i: read().transform[i], lambda t, label, merge, i=i: put(i, t, label, merge), self.session.seal)
+            form = RecordForm(lambda i=i: read().transform[i], lambda t, label, merge, i=i: put(i, t, label, merge), self.session.seal,
+                              slowly=True)
             self.forms[f"transform {i}"] = form
             column.addWidget(form)
+            yield from form.rows
         add = QToolButton()
         add.setText("Add a transform…")
         add.setToolTip("Add a transform after the others; they apply in the order of the list")
@@ -141,16 +170,18 @@ class PropertiesPanel(Panel):
             menu.addAction(type(new).__name__, lambda new=new: append(new))
         add.setMenu(menu)
         column.addWidget(add, 0, Qt.AlignmentFlag.AlignLeft)
-        self.column.addWidget(Section("Transform", body, opened=bool(read().transform)))
+        yield
 
-    def _build_material(self, read: Callable[[], Node], commit: Callable):
+    def _build_material(self, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
         body = QWidget()
         column = QVBoxLayout(body)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
+        self._place(Section("Material", body))
         picker = MaterialPicker(self.session, read, commit)
         self._pickers.append(picker)
         column.addWidget(picker)
+        yield
         if self._material(read()) is not None:
             def commit_material(material, label, merge):
                 name = read().material
@@ -158,13 +189,13 @@ class PropertiesPanel(Panel):
                     self.session.edit_record(Place("material", name), material, f"{name}: {label}", merge)
                 else:
                     commit(msgspec.structs.replace(read(), material=material), label, merge)
-            form = RecordForm(lambda: self._material(read()), commit_material, self.session.seal)
+            form = RecordForm(lambda: self._material(read()), commit_material, self.session.seal, slowly=True)
             self.forms["material"] = form
             column.addWidget(form)
-            self._build_checker(lambda: self._material(read()), commit_material, form)
-        self.column.addWidget(Section("Material", body))
+            yield from form.rows
+            yield from self._build_checker(lambda: self._material(read()), commit_material, form)
 
-    def _build_checker(self, read: Callable[[], Material], commit: Callable, form: Form):
+    def _build_checker(self, read: Callable[[], Material], commit: Callable, form: Form) -> Iterator[None]:
         """A check box for the pattern, and its fields while it is there."""
         def set_checker(checker, label, merge):
             commit(msgspec.structs.replace(read(), checker=checker), label, merge)
@@ -173,19 +204,26 @@ class PropertiesPanel(Panel):
                  lambda made, merge: set_checker(made, "checker", merge), self.session.seal)
         if read().checker is not None:
             inner = RecordForm(lambda: read().checker or Checker(),
-                               lambda made, label, merge: set_checker(made, f"checker {label}", merge), self.session.seal)
+                               lambda made, label, merge: set_checker(made, f"checker {label}", merge), self.session.seal,
+                               slowly=True)
             self.forms["checker"] = inner
             form.add_wide(inner)
+            yield from inner.rows
 
-    def _add(self, name: str, form: Form, heading: str = ""):
+    def _add(self, name: str, form: RecordForm, heading: str = "") -> Iterator[None]:
         self.forms[name] = form
-        self.column.addWidget(Section(heading, form) if heading else form)
+        self._place(Section(heading, form) if heading else form)
+        yield from form.rows
+
+    def _place(self, widget: QWidget):
+        """Below the others, above the empty rest."""
+        self.column.insertWidget(self.column.count() - 1, widget)
 
     def _add_hint(self, text: str):
         label = QLabel(text)
         label.setProperty("role", "hint")
         label.setWordWrap(True)
-        self.column.addWidget(label)
+        self._place(label)
 
     def _commit(self, place: Place) -> Callable[[Record, str, object], None]:
         def commit(record: Record, label: str, merge: object):

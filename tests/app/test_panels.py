@@ -126,6 +126,7 @@ def test_the_tree_and_the_picture_share_the_selection(window, session, qtbot):
     qtbot.mouseClick(view, Qt.MouseButton.LeftButton, pos=view.rect().center())
     assert session.selection == Place("node", (1,))
     assert tree.model.data(tree.view.currentIndex()) == "red ball"
+    window.panels["Properties"].complete()
     assert window.panels["Properties"].forms["node"].editors["name"].entry.text() == "red ball"
     tree.view.setCurrentIndex(tree.model.find(Place("node", (3, 0, 1))))
     assert session.selection == Place("node", (3, 0, 1))
@@ -156,6 +157,7 @@ def test_the_tree_model_is_sound(window, session, qtmodeltester):
 def test_properties_edit_shape_material_and_transform(window, session, qtbot):
     panel = window.panels["Properties"]
     session.select(Place("node", (1,)))
+    window.panels["Properties"].complete()
     type_into(qtbot, panel.forms["shape"].editors["radius"].entries[0], "1.5")
     assert node_at(session.scene, (1,)).shape.radius == 1.5
     type_into(qtbot, panel.forms["shape"].editors["radius"].entries[0], "-2")
@@ -164,6 +166,7 @@ def test_properties_edit_shape_material_and_transform(window, session, qtbot):
     type_into(qtbot, panel.forms["material"].editors["color"].entry, "#00ff00")
     assert node_at(session.scene, (1,)).material.color == (0, 1, 0)
     session.select(Place("node", (3,)))
+    window.panels["Properties"].complete()
     type_into(qtbot, panel.forms["transform 0"].editors["offset"].entries[1], "0.5")
     assert node_at(session.scene, (3,)).transform[0].offset == (2.5, 0.5, 0)
 
@@ -171,11 +174,14 @@ def test_properties_edit_shape_material_and_transform(window, session, qtbot):
 def test_a_shared_material_changes_wherever_it_is_named(window, session, qtbot):
     session.select(Place("node", (0,)))
     panel = window.panels["Properties"]
+    panel.complete()
     type_into(qtbot, panel.forms["material"].editors["diffuse"].entries[0], "0.5")
     assert session.scene.materials["floor"].diffuse == 0.5 and node_at(session.scene, (0,)).material == "floor"
     panel.forms["material"].editors["checker"].box.click()
+    panel.complete()
     assert session.scene.materials["floor"].checker is None and "checker" not in panel.forms
     session.document.undo()
+    panel.complete()
     assert "checker" in panel.forms
 
 

@@ -130,6 +130,7 @@ def test_themes(window, choice):
 def test_everything_has_a_tooltip_and_an_accessible_name(window, session):
     for place in (Place("node", (1,)), Place("node", (3,)), Place("light", 0), Place("material", "floor")):
         session.select(place)
+        window.panels["Properties"].complete()
         for kind in (QLineEdit, QSlider, QComboBox, QCheckBox, QPushButton, QToolButton):
             for widget in window.findChildren(kind):
                 qts_own = widget.objectName().startswith("qt_") or isinstance(widget.parent(), (QDockWidget, QTabBar))
