@@ -27,11 +27,13 @@ class Subject(NamedTuple):
     fog: bool
     reflections: bool
     max_depth: int
+    filter: str
 
     @classmethod
     def of(cls, job: Job) -> "Subject":
         options = job.options
-        return cls(job.scene, job.camera, job.size, options.shadows, options.fog, options.reflections, int(options.max_depth))
+        return cls(job.scene, job.camera, job.size, options.shadows, options.fog, options.reflections, int(options.max_depth),
+                   options.filter)
 
     def matches(self, other: "Subject") -> bool:
         """Whether both have the same picture. Scenes are told apart by identity, as everywhere."""

@@ -7,6 +7,8 @@ much as a few samples count, so that one whose first samples happen to agree bes
 
 Everything is decided from the film between whole passes, so it does not depend on threads.
 """
+from collections.abc import Callable
+
 import numpy as np
 
 from rtcore.film import Film
@@ -23,23 +25,25 @@ LEVELS = 32             # logarithms of a number of samples
 POWER = 1.5             # the squared error of an edge falls with the number of samples to this power
 CONVERGED = 2.0 ** -14  # an error that no screen shows: a fifth of the first step above black in an 8-bit picture
 FEW = 16                # pixels' worth of trust in POWER where few pixels tell the scale
+BANDS = 16              # of the picture, for threads to share
 BINS = 8                # of an octave, in which the share of a pass is found
 
 
 @kernel
-def _scatter(film, out):
-    """The variance of every pixel's samples, the mean over its channels; 0 where there is one sample only."""
-    for p in range(out.shape[0]):
+def _scatter(film, first, last, out):
+    """The variance of the samples of pixels first .. last - 1, the mean over its channels; 0 where there is one sample only."""
+    for p in range(first, last):
         n = np.float64(film.count[p])
         square = film.total[p, 0] ** 2 + film.total[p, 1] ** 2 + film.total[p, 2] ** 2
         out[p] = max((film.square[p] - square / (3 * n)) / (n - 1), 0.0) if n > 1 else 0.0
 
 
 @kernel
-def _compare(film, scatter, width, height, prior, out, level, sums):
-    """Squared errors as scatter alone tells them, a pixel's own and its neighbours', and the logarithm of the number of samples as level;
-    by level sums[0] over the pixels of what the replicates tell, sums[1] of what their scatter alone would, sums[2] how many scatter."""
-    for y in range(height):
+def _compare(film, scatter, width, height, top, bottom, prior, out, level, sums):
+    """For rows top .. bottom - 1 squared errors as scatter alone tells them, a pixel's own and its neighbours', and the logarithm of the
+    number of samples as level; by level sums[0] over the pixels of what the replicates tell, sums[1] of what their scatter alone would,
+    sums[2] how many scatter."""
+    for y in range(top, bottom):
         for x in range(width):
             p = y * width + x
             n = film.count[p]
@@ -65,15 +69,17 @@ def _compare(film, scatter, width, height, prior, out, level, sums):
             sums[2, at] += scatter[p] > 0
 
 
-def squared_errors(film: Film, width: int, height: int) -> np.ndarray:
-    """The estimated squared error of every pixel, the mean over its channels: float32 (h·w), inf where there are too few samples."""
+def squared_errors(film: Film, width: int, height: int, spread: Callable = map) -> np.ndarray:
+    """The estimated squared error of every pixel, the mean over its channels: float32 (h·w), inf where there are too few samples. spread: a
+    `map` that may work on several threads."""
     if len(film.square) == 0:
         return np.full(height * width, np.inf, np.float32)
     scatter, result = np.empty(height * width, np.float32), np.empty(height * width, np.float32)
-    level, sums = np.empty(height * width, np.uint8), np.zeros((3, LEVELS))
-    _scatter(film, scatter)
-    _compare(film, scatter, width, height, PRIOR, result, level, sums)
-    told, naive, pixels = sums
+    level, sums = np.empty(height * width, np.uint8), np.zeros((BANDS, 3, LEVELS))
+    rows = [height * k // BANDS for k in range(BANDS + 1)]      # always as many, for sums depend on what is summed first
+    list(spread(lambda k: _scatter(film, rows[k] * width, rows[k + 1] * width, scatter), range(BANDS)))
+    list(spread(lambda k: _compare(film, scatter, width, height, rows[k], rows[k + 1], PRIOR, result, level, sums[k]), range(BANDS)))
+    told, naive, pixels = sums.sum(axis=0)
     number = 2.0 ** np.arange(LEVELS)
     # as if some more pixels, typical of the picture, told what is usual: those left at a level may all agree, and tell nothing
     trust = FEW * (naive * number).sum() / max(pixels.sum(), 1) / number
@@ -83,25 +89,24 @@ def squared_errors(film: Film, width: int, height: int) -> np.ndarray:
     return result
 
 
-def rmse_estimate(film: Film, width: int, height: int) -> float | None:
-    """Root mean square error of the mean picture, over pixels and channels, counting what a pixel's neighbours let expect of it. So it is
-    fair where pixels got no more samples because their first ones agreed. None below two samples."""
-    squared = squared_errors(film, width, height)
+def rmse_estimate(squared: np.ndarray) -> float | None:
+    """Root mean square error of the mean picture, over pixels and channels, from its `squared_errors`. They count what a pixel's neighbours
+    let expect of it, so it is fair where pixels got no more samples because their first ones agreed. None below two samples."""
     squared = squared[np.isfinite(squared)]
     return float(np.sqrt(squared.mean(dtype=np.float64))) if len(squared) else None
 
 
-def refinement(film: Film, width: int, height: int, order: np.ndarray, budget: float, growth: float = GROWTH,
+def refinement(film: Film, squared: np.ndarray, order: np.ndarray, budget: float, growth: float = GROWTH,
                enough: float = CONVERGED, inside: np.ndarray | None = None) -> Pass | None:
-    """The next pass: the pixels, in `order`, that get more samples, each in all a power of two, so that the expected error of the picture
-    is the least for the pass's cost. budget: samples the whole picture may have, per pixel. None if it is spent; a pass without pixels if
-    no pixel's error is larger than `enough`. inside: bool (h·w), pixels that are a picture of their own; the others get none."""
-    squared = squared_errors(film, width, height)
+    """The next pass for a film and its `squared_errors`: the pixels, in `order`, that get more samples, each in all a power of two, so that
+    the expected error of the picture is the least for the pass's cost. budget: samples the whole picture may have, per pixel. None if it
+    is spent; a pass without pixels if no pixel's error is larger than `enough`. inside: bool (h·w), pixels that are a picture of their own;
+    the others get none."""
     if inside is not None:
-        squared[~inside] = 0
+        squared = np.where(inside, squared, np.float32(0))
     open_ = np.flatnonzero(squared > enough ** 2)
     spent = int(film.count.sum(dtype=np.int64, where=True if inside is None else inside))
-    pixels = width * height if inside is None else np.count_nonzero(inside)
+    pixels = len(film.count) if inside is None else np.count_nonzero(inside)
     left = min(budget * pixels - spent, growth * spent)
     if len(open_) == 0:
         return Pass(1, False, range(0), np.empty((0, 3), np.int32))

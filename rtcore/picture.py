@@ -80,6 +80,7 @@ class Render:
         self.plan, self.pace, self.pool = composed, pace, pool
         self.finished = False   # the pass
         self.tracing = False    # the pool is at it
+        self._squared: np.ndarray | None = None
         self.done = False
         self.dropped = geometry.dropped
         width, height = size = self.settings.size
@@ -166,7 +167,7 @@ class Render:
         def stale() -> bool:
             return halt.is_set() or cancelled() or time.perf_counter() > deadline
 
-        self.tracing = True
+        self.tracing, self._squared = True, None
         shares = [self.pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
         try:
             while wait(shares, patience, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
@@ -211,8 +212,15 @@ class Render:
         if min(self.plan.samples, self.samples) < 2:
             return None
         uneven = self.adaptive and self.samples >= adaptive.FIRST
-        film = self.settled()
-        return adaptive.rmse_estimate(film, *self.settings.size) if uneven else films.rmse_estimate(film)
+        return adaptive.rmse_estimate(self.squared_errors()) if uneven else films.rmse_estimate(self.settled())
+
+    def squared_errors(self) -> np.ndarray:
+        """`adaptive.squared_errors`, worked out once between two passes."""
+        if self.tracing:        # the pool has its hands full, and the film grows
+            return adaptive.squared_errors(self.settled(), *self.settings.size)
+        if self._squared is None:
+            self._squared = adaptive.squared_errors(self.settled(), *self.settings.size, self.pool.map)
+        return self._squared
 
     def settled(self) -> films.Film:
         """The film as it is to be read."""
@@ -252,8 +260,8 @@ class Render:
             x0, y0, x1, y1 = self.regions[0]
             inside = np.zeros(size[::-1], bool)
             inside[y0:y1, x0:x1] = True
-        return adaptive.refinement(self.settled(), *size, self.order, self.plan.samples, growth, min(adaptive.CONVERGED, target),
-                                   None if inside is None else inside.ravel())
+        return adaptive.refinement(self.settled(), self.squared_errors(), self.order, self.plan.samples, growth,
+                                   min(adaptive.CONVERGED, target), None if inside is None else inside.ravel())
 
     def counts(self) -> np.ndarray:
         """What all threads have counted so far."""
@@ -298,7 +306,7 @@ class Render:
         shown = VIEW[self.settings.view].draw(Seen(
             pixels, node, self.materials, distance, film.count.reshape(height, width),
             normal=lambda: spread(film.normal), doubt=lambda: spread(film.doubt), lit=lambda: spread(film.lit),
-            error=lambda: np.sqrt(adaptive.squared_errors(self.settled(), width, height)).reshape(height, width),
+            error=lambda: np.sqrt(self.squared_errors()).reshape(height, width),
             coordinates=lambda: spread(self.recast.coordinates(film)), tests=lambda: spread(self.recast.tests(film))))
         self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,

@@ -103,6 +103,9 @@ class Renderer:
             if cancelled():
                 return
             render.done = not (render.finished and render.goes_on())
+            if cancelled() and not render.done:
+                render.number += 1      # when it goes on, it does so with the next pass
+                return
             if render.done:
                 render.progress = 1.0
             yield render.frame(render.done)
