@@ -1,8 +1,9 @@
 """How fast first samples are traced on the scene at hand; from that, how fine the first lattice may be for the time there is."""
 import math
 
-from rtcore.schedule import BLOCK, COARSEST, LATTICES, TILE
+from rtcore.schedule import COARSEST, LATTICES, TILE
 
+EDGES = (2 * TILE, TILE, TILE // 2, TILE // 4)
 LONG = 0.006        # seconds that a tile may take: then its thread sees that it is not wanted any more
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
 
@@ -47,8 +48,8 @@ class Pace:
         return 1 if known and self._known is None else COARSEST
 
     def edge(self) -> int:
-        """Lattice points along the edge of a tile."""
-        each, edge = self.seconds(1), TILE
-        while each is not None and edge > 2 * BLOCK and edge ** 2 * each > LONG:
-            edge //= 2
-        return edge
+        """Lattice points along the edge of a tile: a large one has fewer calls a ray."""
+        each = self.seconds(1)
+        if each is None:
+            return TILE
+        return next((edge for edge in EDGES if edge ** 2 * each <= LONG), EDGES[-1])
