@@ -11,8 +11,14 @@ import numpy as np
 from rtcore.jit import inline, kernel
 from rtcore.sampling import GLOSS, centered, disk, hash32
 from rtcore.shading import IOR, REFRACTED, ROUGHNESS
-from rtcore.shapes.kind import normalized
 from rtcore.wave import DX, DY, DZ, GX, GY, GZ, NX, NY, NZ
+
+
+@inline
+def _unit(x, y, z):
+    """An ordinary vector at length 1."""
+    shrink = 1 / np.sqrt(max(x * x + y * y + z * z, 1e-300))
+    return x * shrink, y * shrink, z * shrink
 
 
 @inline
@@ -20,7 +26,7 @@ def facet(u, v, cosine, alpha):
     """A facet's normal (x, y, z) in axes in which the surface's is z and the direction to the eye is (sine, 0, cosine), for two numbers in
     0 .. 1. alpha: GGX's width. The middle of the square gives the surface's own normal."""
     # the eye's direction in the space where the facets are a hemisphere
-    x, _, z = normalized(alpha * np.sqrt(max(1 - cosine * cosine, 0.0)), 0.0, cosine)
+    x, _, z = _unit(alpha * np.sqrt(max(1 - cosine * cosine, 0.0)), 0.0, cosine)
     bent = 0.5 * (1 + z)
     # the hemisphere, seen from there, is a disk whose upper half is compressed; its pole is at (0, x). The square is shifted, around its
     # edge, until its middle comes there
@@ -29,7 +35,7 @@ def facet(u, v, cosine, alpha):
     b = (1 - bent) * np.sqrt(max(1 - a * a, 0.0)) + bent * b
     c = np.sqrt(max(1 - a * a - b * b, 0.0))
     # axes: a along y, b along (-z, 0, x), c along (x, 0, z)
-    return normalized(alpha * (c * x - b * z), alpha * a, max(b * x + c * z, 0.0))
+    return _unit(alpha * (c * x - b * z), alpha * a, max(b * x + c * z, 0.0))
 
 
 @inline
@@ -42,10 +48,9 @@ def place(pixel, sample, dimension, seed):
 
 
 @inline
-def _faced(rays, surface, i):
+def _faced(ray, surface, i):
     """Unit geometric and shading normal on the side that ray i comes from, and 1 if that is the front, else -1."""
-    d = rays.ray
-    side = 1.0 if d[DX, i] * surface[GX, i] + d[DY, i] * surface[GY, i] + d[DZ, i] * surface[GZ, i] < 0 else -1.0
+    side = 1.0 if ray[DX, i] * surface[GX, i] + ray[DY, i] * surface[GY, i] + ray[DZ, i] * surface[GZ, i] < 0 else -1.0
     return (side * surface[GX, i], side * surface[GY, i], side * surface[GZ, i],
             side * surface[NX, i], side * surface[NY, i], side * surface[NZ, i], side)
 
@@ -56,15 +61,16 @@ def roughen(wave, child, n, look, before, path, target, number, seed):
     from. before, path: int32, for each ray of the wave and of the child the turns that led to it, 1 for the eye's and one binary digit more
     for each reflection (0) or refraction (1), a hash of them where they are many: so rays of one sample draw from different dimensions.
     target, number: pixels and sample numbers of the primary rays. Not for a pixel's sample 0, which goes the smooth way."""
-    rays, surface, m, out = wave.rays, wave.surface, look.material, child.rays.ray
+    ray, prim, surface, m, of = wave.rays.ray, wave.rays.prim, wave.surface, look.material, look.of
+    out, source, owners = child.rays.ray, child.source, child.owner
     for j in range(n):
-        i, way = child.source[j] >> 1, child.source[j] & 1
+        i, way = source[j] >> 1, source[j] & 1
         path[j] = 2 * before[i] + way if before[i] < GLOSS // 2 else hash32(2 * before[i] + way) % GLOSS
-        row, owner = look.of[rays.prim[i]], child.owner[j]
+        row, owner = of[prim[i]], owners[j]
         if m[row, ROUGHNESS] == 0:
             continue
-        gx, gy, gz, nx, ny, nz, side = _faced(rays, surface, i)
-        dx, dy, dz = normalized(np.float64(rays.ray[DX, i]), np.float64(rays.ray[DY, i]), np.float64(rays.ray[DZ, i]))
+        gx, gy, gz, nx, ny, nz, side = _faced(ray, surface, i)
+        dx, dy, dz = np.float64(ray[DX, i]), np.float64(ray[DY, i]), np.float64(ray[DZ, i])
         cosine = -(dx * nx + dy * ny + dz * nz)
         if cosine <= 0:     # as in `shading.bounce`
             nx, ny, nz = gx, gy, gz
@@ -75,7 +81,7 @@ def roughen(wave, child, n, look, before, path, target, number, seed):
         tx, ty, tz = -dx - cosine * nx, -dy - cosine * ny, -dz - cosine * nz
         if cosine > 1 - 1e-12:
             tx, ty, tz = (0.0, -nz, ny) if abs(nx) < 0.5 else (-nz, 0.0, nx)
-        tx, ty, tz = normalized(tx, ty, tz)
+        tx, ty, tz = _unit(tx, ty, tz)
         bx, by, bz = ny * tz - nz * ty, nz * tx - nx * tz, nx * ty - ny * tx
         hx, hy, hz = a * tx + b * bx + c * nx, a * ty + b * by + c * ny, a * tz + b * bz + c * nz
         cosine = -(dx * hx + dy * hy + dz * hz)
@@ -90,4 +96,4 @@ def roughen(wave, child, n, look, before, path, target, number, seed):
             k = eta * cosine - np.sqrt(square)
             x, y, z = eta * dx + k * hx, eta * dy + k * hy, eta * dz + k * hz
             wrong = max(x * gx + y * gy + z * gz, 0.0)
-        out[DX, j], out[DY, j], out[DZ, j] = normalized(x - 2 * wrong * gx, y - 2 * wrong * gy, z - 2 * wrong * gz)
+        out[DX, j], out[DY, j], out[DZ, j] = _unit(x - 2 * wrong * gx, y - 2 * wrong * gy, z - 2 * wrong * gz)

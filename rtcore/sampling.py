@@ -67,24 +67,30 @@ def keys(pixel, sample, dimension, seed):
 
 
 @inline
+def _digits(number, across, down):
+    """Point `number` of a sequence for a pair of dimensions, as `square` orders it: two numbers' digits, the first in the lowest bit."""
+    index = mirrored(scrambled(mirrored(np.uint32(number)), hash32(across ^ np.uint32(0x2545F491))))
+    return scrambled(index, across), scrambled(pascal(index), down)
+
+
+@inline
 def square(pixel, sample, dimension, seed):
     """Two numbers in 0 .. 1, 1 not included, of a sample: for the pair of dimensions 1, 2 ... of what is sampled beside the pixel. Pairs
     are independent: each goes through the sequence in an order of its own, which keeps the first 2^k points together."""
     across, down = keys(pixel, sample, dimension, seed)
-    index = mirrored(scrambled(mirrored(np.uint32(sample // REPLICATES)), hash32(across ^ np.uint32(0x2545F491))))
-    x, y = mirrored(scrambled(index, across)), mirrored(scrambled(pascal(index), down))
-    return x * 2.0 ** -32, y * 2.0 ** -32
+    x, y = _digits(sample // REPLICATES, across, down)
+    return mirrored(x) * 2.0 ** -32, mirrored(y) * 2.0 ** -32
 
 
 @inline
 def centered(pixel, sample, dimension, seed):
     """`square`, scrambled so that sample 0 lies in the middle."""
-    x, y = square(pixel, sample, dimension, seed)
-    if sample % REPLICATES == 0:    # flip the digits by those of sample 0 and of 0.1000...: this is a nested scrambling too
-        a, b = square(pixel, 0, dimension, seed)
-        x = (np.uint32(x * 2.0 ** 32) ^ np.uint32(a * 2.0 ** 32) ^ np.uint32(0x80000000)) * 2.0 ** -32
-        y = (np.uint32(y * 2.0 ** 32) ^ np.uint32(b * 2.0 ** 32) ^ np.uint32(0x80000000)) * 2.0 ** -32
-    return x, y
+    across, down = keys(pixel, sample, dimension, seed)
+    x, y = _digits(sample // REPLICATES, across, down)
+    if sample % REPLICATES == 0:    # flip the digits so that point 0 comes to 0.1000...: this is a nested scrambling too
+        a, b = _digits(0, across, down)
+        x, y = np.uint32(x ^ a ^ np.uint32(1)), np.uint32(y ^ b ^ np.uint32(1))
+    return mirrored(x) * 2.0 ** -32, mirrored(y) * 2.0 ** -32
 
 
 @inline

@@ -97,6 +97,13 @@ def test_what_pov_ray_is_not_told_is_said():
     scene = Scene(objects=(Implicit("x^2 + y^2 + z^2 - 1", low=(-1, -1, -1), high=(1, 1, 1)),), lights=(Directional(direction=(0, -1, 0)),))
     with pytest.raises(povray.Untold, match="^Implicit is no shape"):
         povray.povray_text(scene, Camera(), (8, 8), 5)
+    with pytest.raises(povray.Untold, match="^a lens"):
+        povray.povray_text(Scene(), Camera(aperture=0.1), (8, 8), 5)
+    with pytest.raises(povray.Untold, match="^SphereLight is no light"):
+        povray.povray_text(Scene(lights=[rtcore.SphereLight(position=(0, 5, 0))]), Camera(), (8, 8), 5)
+    rough = rtcore.Node(shape=rtcore.Sphere((0, 0, 0), 1), material=Material(reflection=1, roughness=0.1))
+    with pytest.raises(povray.Untold, match="^a rough mirror"):
+        povray.povray_text(Scene(objects=[rough]), Camera(), (8, 8), 5)
 
 
 def test_subdivided_meshes_keep_their_surface_and_share_their_vertices():

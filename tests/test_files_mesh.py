@@ -116,7 +116,7 @@ def test_degenerate_triangles_are_left_out_and_counted(tmp_path):
 def test_mtl_materials(tmp_path):
     from PIL import Image
     Image.new("RGB", (4, 4), (255, 0, 51)).save(tmp_path / "t.png")
-    written(tmp_path, "newmtl red\nKd 1 0 0.5\nKs 0.5 0.5 0.5\nNs 30\nKe 2 0 0\nnewmtl mirror\nKd 0 0 0\nKs .9 .9 .9\nillum 3\n"
+    written(tmp_path, "newmtl red\nKd 1 0 0.5\nKs 0.5 0.5 0.5\nNs 30\nKe 2 0 0\nnewmtl mirror\nKd 0 0 0\nKs .9 .9 .9\nillum 3\nPr 0.3\n"
             "newmtl glass\nKd 0 0 0\nd 0.25\nNi 1.4\nillum 7\nnewmtl wood\nKd 1 1 1\nmap_Kd t.png\n"
             "newmtl odd\nKd nan x\nNs\nNi -\n", "m.mtl")
     faces = "".join(f"usemtl {name}\nf 1 2 3\n" for name in ("red", "mirror", "glass", "wood", "odd", "absent"))
@@ -126,7 +126,7 @@ def test_mtl_materials(tmp_path):
     assert list(looks) == ["red", "mirror", "glass", "wood", "odd", "absent"]
     assert looks["red"].color == (1, 0, linear_from_srgb(0.5)) and looks["red"].emission == (2, 0, 0)
     assert (looks["red"].specular, looks["red"].shininess, looks["red"].reflection) == (0.5, 30, 0)
-    assert looks["mirror"].reflection == pytest.approx(0.9)
+    assert looks["mirror"].reflection == pytest.approx(0.9) and looks["mirror"].roughness == 0.3 and looks["red"].roughness == 0
     assert (looks["glass"].transmission, looks["glass"].ior, looks["glass"].diffuse) == (0.75, 1.4, 0.25)
     assert looks["wood"].color == pytest.approx((1, 0, linear_from_srgb(0.2)))
     assert scene.materials["plaster"] is looks["absent"]
@@ -159,6 +159,10 @@ def test_gltf_materials(tmp_path):
     metal = {"name": "gold", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.2, 0, 1], "metallicFactor": 1, "roughnessFactor": 0}}
     gold = files.load(written(tmp_path, glb(gltf(material=metal)), "a.glb")).materials["gold"]
     assert gold.color == pytest.approx((1, 0.2, 0)) and gold.tint == gold.color and gold.reflection == 1 and gold.diffuse == 0
+    assert gold.roughness == 0
+    metal["pbrMetallicRoughness"]["roughnessFactor"] = 0.25
+    satin = files.load(written(tmp_path, glb(gltf(material=metal)), "b.glb")).materials["gold"]
+    assert satin.roughness == 0.25 and satin.reflection == pytest.approx(0.75 ** 2)
     thin = {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2], "metallicFactor": 0}}
     film, = files.load(written(tmp_path, glb(gltf(material=thin)), "a.glb")).materials.values()
     assert film.transmission == pytest.approx(0.8) and film.ior == 1 and film.reflection == 0

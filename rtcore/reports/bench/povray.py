@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from rtcore.camera import Camera
-from rtcore.lights import Ambient, Point
+from rtcore.lights import SAMPLED, Ambient, Point
 from rtcore.scene import Leaf, Light, Material, Scene, Shape
 from rtcore.shapes import Box, Cone, Cylinder, Mesh, Plane, Polygon, Sphere, Torus, Triangle
 
@@ -17,7 +17,10 @@ class Untold(ValueError):
 
 
 def povray_text(scene: Scene, camera: Camera, size: tuple[int, int], depth: int) -> str:
-    """The scene as the text of a .pov file. Raises Untold for a shape that is not handed over."""
+    """The scene as the text of a .pov file. Raises Untold for what is not handed over: some shapes, lights with an extent, a lens, rough
+    mirrors and glass."""
+    if camera.aperture > 0:
+        raise Untold("a lens is not handed over")
     width, height = size
     eye, corner, right, down = camera.rays(width, height)
     right, down = width * right, height * down
@@ -46,6 +49,8 @@ def vector(numbers: Iterable[float]) -> str:
 
 
 def _light(light: Light, eye: np.ndarray) -> str:
+    if isinstance(light, SAMPLED):
+        raise Untold(f"{type(light).__name__} is no light that is handed over")
     color = vector(light.intensity * np.array(light.color))
     if isinstance(light, Point):
         fade = " fade_distance 1 fade_power 2" if light.falloff == "inverse-square" else ""
@@ -55,6 +60,8 @@ def _light(light: Light, eye: np.ndarray) -> str:
 
 
 def _material(material: Material, ambient: np.ndarray) -> str:
+    if material.roughness > 0 and (material.reflection > 0 or material.transmission > 0):
+        raise Untold("a rough mirror or glass is not handed over")
     if material.checker is None:
         pigment = f"rgb {vector(material.color)} filter {material.transmission!r}"
     else:
