@@ -296,7 +296,7 @@ def warm_up(window: Window, scenes: list[Path]):
             for on in (False, True):
                 session.switch(name, on)
                 settled()
-        for node in range(len(session.scene.objects)):
+        for node in range(min(len(session.scene.objects), 3)):
             place = Place("node", (node,))
             session.edit_record(place, msgspec.structs.replace(node_at(session.scene, place.key), visible=False), "hide")
             settled()

@@ -1,5 +1,6 @@
 """An X display of its own with a window manager, a window on it, and hands: mouse, keyboard, eyes."""
 import contextlib
+import ctypes
 import json
 import os
 import shutil
@@ -25,10 +26,12 @@ def missing_tools() -> list[str]:
 
 
 @contextlib.contextmanager
-def display(width: int, height: int, config: Path) -> Iterator[dict[str, str]]:
-    """The environment of a fresh display with a window manager; preferences are kept under `config`."""
+def display(width: int, height: int, config: Path, memory: Path | None = None) -> Iterator[dict[str, str]]:
+    """The environment of a fresh display with a window manager; preferences are kept under `config`, and what is on the screen in a file
+    in the folder `memory`, where one is given (see `Eyes`)."""
     read, write = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp"],
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", f"{width}x{height}x24", "-nolisten", "tcp",
+                               *(["-fbdir", str(memory)] if memory else [])],
                               pass_fds=[write], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write)
     with os.fdopen(read) as pipe:
@@ -45,6 +48,36 @@ def display(width: int, height: int, config: Path) -> Iterator[dict[str, str]]:
         for process in (manager, server):
             process.terminate()
             process.wait(10)
+
+
+class Eyes:
+    """The screen as the server has it in memory: (h, w, 4) uint8, blue first, without a copy."""
+
+    def __init__(self, memory: Path):
+        self._map = np.memmap(memory / "Xvfb_screen0", np.uint8, "r")
+        head = self._map[:100].view(">u4")      # of an XWD file
+        width, height, line, colors = (int(head[i]) for i in (4, 5, 12, 19))
+        self.pixels = self._map[int(head[0]) + 12 * colors:][:height * line].reshape(height, line // 4, 4)[:, :width]
+
+
+class Fingers:
+    """The mouse by the XTEST extension, as xdotool has it but without a process for every move."""
+
+    def __init__(self, environment: dict[str, str]):
+        self._x, self._test = ctypes.CDLL("libX11.so.6"), ctypes.CDLL("libXtst.so.6")
+        self._x.XOpenDisplay.restype = ctypes.c_void_p
+        self._display = ctypes.c_void_p(self._x.XOpenDisplay(environment["DISPLAY"].encode()))
+
+    def move(self, x: int, y: int):
+        self._test.XTestFakeMotionEvent(self._display, -1, x, y, 0)
+        self._x.XFlush(self._display)
+
+    def press(self, down: bool, button: int = 1):
+        self._test.XTestFakeButtonEvent(self._display, button, int(down), 0)
+        self._x.XFlush(self._display)
+
+    def close(self):
+        self._x.XCloseDisplay(self._display)
 
 
 class Hands:
