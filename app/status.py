@@ -53,8 +53,10 @@ def error_text(error: float | None) -> str:
 
 
 def speed_text(frame) -> str:
-    """Million rays a second of a frame so far."""
+    """Million rays a second of a frame so far; or that there were none, for all that they would meet was known."""
     rays = sum(frame.rays.get(kind, 0) for kind in TRACED)
+    if rays == 0 and frame.samples:
+        return "no ray traced"
     return f"{rays / frame.elapsed / 1e6:,.1f} Mrays/s" if frame.elapsed > 0 else ""
 
 

@@ -8,6 +8,7 @@ leaves valid is said in `rtcore.edits`.
 
 Twelve bytes a ray (eight with float32) and four for each light that shone on it.
 """
+import threading
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -138,11 +139,9 @@ class Memory:
 
     def __init__(self):
         self.tiles: dict[bytes, list[Level]] = {}
-        self._nbytes: dict[bytes, int] = {}
-
-    @property
-    def nbytes(self) -> int:
-        return sum(self._nbytes.values())
+        self.nbytes = 0
+        self._sizes: dict[bytes, int] = {}
+        self._lock = threading.Lock()
 
     def recall(self, tile: np.ndarray) -> "Recall":
         """For tracing a tile again."""
@@ -152,8 +151,11 @@ class Memory:
         """What was met on a tile now."""
         key, levels = tile.tobytes(), recall.kept()
         size = sum(level.nbytes for level in levels)
-        if key in self.tiles or self.nbytes + size <= MOST:
-            self.tiles[key], self._nbytes[key] = levels, size
+        with self._lock:
+            grown = size - self._sizes.get(key, 0)
+            if self.nbytes + grown <= MOST or key in self.tiles:
+                self.tiles[key], self._sizes[key] = levels, size
+                self.nbytes += grown
 
     def covers(self, tiles: Iterable[np.ndarray]) -> bool:
         """Whether something is kept of all these tiles."""
@@ -175,25 +177,26 @@ class Memory:
             for level in levels:
                 level.shades = {key: shade for key, shade in level.shades.items() if key in but}
 
-    def renumber(self, number: np.ndarray, through: bool, boxes: np.ndarray) -> bool:
+    def renumber(self, number: np.ndarray, through: bool, boxes: np.ndarray) -> None:
         """Shapes went and came. number: int32, the new number of each primitive, or UNKNOWN; `through`: something that went let light
-        through; boxes (m, 6): around what came. False if so much has come that nothing is kept."""
-        moved = (number != np.arange(len(number))).any()
+        through; boxes (m, 6): around what came."""
+        moved = bool((number != np.arange(len(number))).any())
         for levels in self.tiles.values():
             for level in levels:
                 if moved:
                     level.noted = False
                     level.whole &= not _renumber(level.prim, number)
-                level.boxes = np.concatenate([level.boxes, boxes])
-                if len(level.boxes) > BOXES:
-                    self.tiles.clear()
-                    self._nbytes.clear()
-                    return False
+                if len(boxes):
+                    level.boxes = np.concatenate([level.boxes, boxes])
                 for key, (depth, since) in level.shades.items():
                     if moved or through:
                         _renumber_shade(depth, number, through)
-                    level.shades[key] = Shade(depth, np.concatenate([since, boxes]))
-        return True
+                    if len(boxes):
+                        level.shades[key] = Shade(depth, np.concatenate([since, boxes]))
+        if any(len(level.boxes) > BOXES for levels in self.tiles.values() for level in levels):
+            self.tiles.clear()
+            self._sizes.clear()
+            self.nbytes = 0
 
 
 class Recall:
