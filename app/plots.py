@@ -249,7 +249,8 @@ def apart(heights: list[float], least: float) -> list[float]:
     return result
 
 
-def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, small: bool = False, left: bool = False):
+def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: Style, small: bool = False,
+          left: bool = False) -> pg.TextItem:
     """Write to the right of a point, or to the left."""
     label = pg.TextItem(text, color=color, anchor=(1 if left else 0, 0.5))
     font = QFont()
@@ -258,6 +259,7 @@ def write(plot: pg.PlotItem, text: str, x: float, y: float, color: str, style: S
     label.setFont(font)
     label.setPos(x, y)
     plot.addItem(label, ignoreBounds=True)
+    return label
 
 
 #: The figures of a shape, by name.
