@@ -52,9 +52,8 @@ def suits(film: Film, samples: int, lit: bool, signed: bool) -> bool:
 
 
 def clear(film: Film) -> None:
-    """Let it be a new film. First hits stay until others are noted: where there is no sample they are not looked at."""
-    for array in (film.total, film.split, film.square, film.count, film.plain):
-        array.fill(0)
+    """Let it be a new film. What is left of the old one is not looked at where there is no sample, and the first one replaces it."""
+    film.count.fill(0)
 
 
 @kernel
@@ -138,6 +137,9 @@ def _commit_eight(film, p, r, g, b):
     total = r + g + b
     finite = total - total == 0
     r, g, b = select(finite, r, 0), select(finite, g, 0), select(finite, b, 0)
+    if film.count[p] == 0:      # so it is for all eight: they were traced together
+        for q in range(p, p + LANES):
+            begin(film, q)
     add_triples(film.total, p, r, g, b)
     if film.square.shape[0] > 0:
         side = turns(film.count, p)
@@ -148,11 +150,21 @@ def _commit_eight(film, p, r, g, b):
 
 
 @inline
+def begin(film, p):
+    """Pixel p has no sample yet."""
+    film.total[p, 0] = film.total[p, 1] = film.total[p, 2] = 0
+    if film.square.shape[0] > 0:
+        film.split[p, 0] = film.split[p, 1] = film.split[p, 2] = film.square[p] = 0
+
+
+@inline
 def _commit_one(film, p, r, g, b):
     """A finished sample of pixel p; says whether it was not finite."""
     bad = not np.isfinite(r + g + b)
     if bad:
         r = g = b = 0.0
+    if film.count[p] == 0:
+        begin(film, p)
     film.total[p, 0] += r
     film.total[p, 1] += g
     film.total[p, 2] += b
@@ -176,9 +188,9 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
             while film.count[p] == 0 and step < spacing:
                 step *= 2
                 p = y // step * step * width + x // step * step
-            c = max(film.count[p], 1)
+            c = film.count[p]
             for k in range(3):
-                pixels[y, x, k] = film.total[p, k] / c
+                pixels[y, x, k] = film.total[p, k] / c if c > 0 else 0.0
             node[y, x] = leaf[film.prim[p]] if film.prim[p] >= 0 else -1
             distance[y, x] = film.distance[p]
 
