@@ -303,11 +303,12 @@ class Render:
 
         def spread(values: np.ndarray) -> np.ndarray:
             return self.recast.spread(film, values, COARSEST)
+        share = map if self.tracing else self.pool.map
         shown = VIEW[self.settings.view].draw(Seen(
             pixels, node, self.materials, distance, film.count.reshape(height, width),
             normal=lambda: spread(film.normal), doubt=lambda: spread(film.doubt), lit=lambda: spread(film.lit),
             error=lambda: np.sqrt(self.squared_errors()).reshape(height, width),
-            coordinates=lambda: spread(self.recast.coordinates(film)), tests=lambda: spread(self.recast.tests(film))))
+            coordinates=lambda: spread(self.recast.coordinates(film, share)), tests=lambda: spread(self.recast.tests(film, share))))
         self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
                      self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),

@@ -2,6 +2,8 @@
 primitives its ray had to be tested against. Both follow from the pixel's centre and what the film keeps of sample 0; nothing is traced, and
 the kernels that trace know nothing of it.
 """
+from collections.abc import Callable
+
 import numpy as np
 
 from rtcore.across import count, lowest_bit
@@ -36,6 +38,19 @@ def cast_again(rays, n, view, width, pixels, film):
         put_ray(rays, i, view[0, 0], view[0, 1], view[0, 2], dx, dy, dz, film.distance[p])
         rays.prim[i] = film.prim[p]
     finish(rays, n)
+
+
+@kernel
+def note_places(rays, surface, n, pixels, first, last, triangles, out):
+    """Where the n rays that hit one of the primitives first .. last - 1 did: out[pixels[i]] becomes the weights of a triangle's corners, or
+    what u and v are above a whole number, and 0."""
+    for i in range(n):
+        if first <= rays.prim[i] < last:
+            p, u, v = pixels[i], np.float64(surface[U, i]), np.float64(surface[V, i])
+            if triangles:
+                out[p, 0], out[p, 1], out[p, 2] = 1 - u - v, u, v
+            else:
+                out[p, 0], out[p, 1], out[p, 2] = u - np.floor(u), v - np.floor(v), 0
 
 
 @kernel
@@ -89,41 +104,48 @@ class Recast:
 
     def spread(self, film: Film, values: np.ndarray, spacing: int) -> np.ndarray:
         """Values of pixels, (h·w, ...), as a picture (h, w, ...): those without a sample show that of the lattice before them."""
+        if film.count.all():
+            return values.reshape(self._height, self._width, *values.shape[1:]).copy()
         source = np.empty(self._height * self._width, np.int32)
         sources(film, self._width, self._height, spacing, source)
         return values[source].reshape(self._height, self._width, *values.shape[1:])
 
-    def tests(self, film: Film) -> np.ndarray:
-        """Boxes and primitives that each pixel's first ray must be tested against, int32 (h·w); 0 where there is no sample yet."""
+    def tests(self, film: Film, share: Callable = map) -> np.ndarray:
+        """Boxes and primitives that each pixel's first ray must be tested against, int32 (h·w); 0 where there is no sample yet. share:
+        `map`, or that of a pool of threads."""
         if not len(self._tested):
             self._tests, self._tested = np.zeros(len(film.count), np.int32), np.zeros(len(film.count), bool)
-        pixels = self._fresh(film, self._tested)
-        for group in self._geometry.groups:
-            count_tests(group.tree, len(group.owner), self._view, self._width, pixels, film.distance, self._tests)
+
+        def work(pixels: np.ndarray) -> None:
+            for group in self._geometry.groups:
+                count_tests(group.tree, len(group.owner), self._view, self._width, pixels, film.distance, self._tests)
+
+        for _ in share(work, self._fresh(film, self._tested)):
+            pass
         return self._tests
 
-    def coordinates(self, film: Film) -> np.ndarray:
+    def coordinates(self, film: Film, share: Callable = map) -> np.ndarray:
         """Where on its surface each pixel's first hit lies, float32 (h·w, 3): on a triangle the weights of its corners, which add up to 1,
-        else u, v and 0; zeros where nothing is hit or there is no sample yet."""
+        else u, v, from 0 to 1 and again, and 0; zeros where nothing is hit or there is no sample yet."""
         if not len(self._placed):
             self._coordinates, self._placed = np.zeros((len(film.count), 3), np.float32), np.zeros(len(film.count), bool)
-        fresh = self._fresh(film, self._placed)
-        rays = new_rays(CHUNK, self._geometry.dtype)
-        surface = np.zeros((SURFACE_ROWS, CHUNK), self._geometry.dtype)
-        for start in range(0, len(fresh), CHUNK):
-            pixels = fresh[start:start + CHUNK]
-            cast_again(rays, len(pixels), self._view, self._width, pixels, film)
-            prim = rays.prim[:len(pixels)]
+
+        def work(pixels: np.ndarray) -> None:
+            rays, n = new_rays(CHUNK, self._geometry.dtype), len(pixels)
+            surface = np.empty((SURFACE_ROWS, CHUNK), self._geometry.dtype)
+            cast_again(rays, n, self._view, self._width, pixels, film)
             for group in self._geometry.groups:
-                group.kind.surface(rays, len(pixels), surface, group.table, group.first)
-                own = np.flatnonzero((prim >= group.first) & (prim < group.first + len(group.owner)))
-                u, v = surface[U, own], surface[V, own]
-                self._coordinates[pixels[own]] = np.stack((1 - u - v, u, v) if group.kind is TRIANGLE else (u, v, 0 * u), axis=1)
+                group.kind.surface(rays, n, surface, group.table, group.first)
+                last = group.first + len(group.owner)
+                note_places(rays, surface, n, pixels, group.first, last, group.kind is TRIANGLE, self._coordinates)
+
+        for _ in share(work, self._fresh(film, self._placed)):
+            pass
         return self._coordinates
 
     @staticmethod
-    def _fresh(film: Film, known: np.ndarray) -> np.ndarray:
-        """Pixels, int32, that have a sample by now and are not known yet; then they are."""
+    def _fresh(film: Film, known: np.ndarray) -> list[np.ndarray]:
+        """Pixels, int32, that have a sample by now and are not known yet, CHUNK at a time; then they are."""
         pixels = np.flatnonzero((film.count > 0) & ~known).astype(np.int32)
         known[pixels] = True
-        return pixels
+        return [pixels[start:start + CHUNK] for start in range(0, len(pixels), CHUNK)]

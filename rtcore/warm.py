@@ -19,7 +19,7 @@ from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
 from rtcore.trace import CLOSEST, COUNTS
-from rtcore.wave import NO_ANSWER, new_beam, new_rays, new_wave
+from rtcore.wave import NO_ANSWER, SURFACE_ROWS, new_beam, new_rays, new_wave
 
 
 def _wave(dtype):
@@ -85,6 +85,7 @@ def _adaptive(dtype):
 def _recast(dtype):
     film, pixels = films.new_film(8, 8), np.zeros(0, np.int32)
     recast.cast_again(new_rays(8, dtype), 0, Camera().rays(8, 8), 8, pixels, film)
+    recast.note_places(new_rays(8, dtype), np.empty((SURFACE_ROWS, 8), dtype), 0, pixels, 0, 0, False, np.empty((0, 3), np.float32))
     recast.count_tests(bvh.EMPTY_TREE, 0, Camera().rays(8, 8), 8, pixels, film.distance, pixels)
 
 

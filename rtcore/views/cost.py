@@ -4,10 +4,11 @@ import numpy as np
 from rtcore.views.view import View, heat
 
 WHITE = 1 << 10     # one more than that many tests
+TONES = heat(np.log2(np.arange(1, WHITE + 1)) / np.log2(WHITE) + (np.arange(WHITE) == WHITE - 1))     # by their number
 
 
 def draw(seen):
-    return heat(np.log2(1.0 + seen.tests()) / np.log2(WHITE))
+    return TONES[np.minimum(seen.tests(), WHITE - 1)]
 
 
 COST = View("cost", f"how many boxes and primitives an eye ray must be tested against, brighter by the octave; white: {WHITE - 1:,}", draw,

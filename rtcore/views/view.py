@@ -47,11 +47,13 @@ def palette(n: int) -> np.ndarray:
 def heat(share: np.ndarray) -> np.ndarray:
     """Shares 0 .. 1 (h, w) as linear colours (h, w, 3) from black through violet, red and orange to pale yellow, evenly brighter to the
     eye. What is above 1 is white."""
-    places = np.linspace(0, 1, len(HEAT))
-    colors = np.stack([np.interp(share, places, HEAT[:, k], right=1.0) for k in range(3)], axis=-1)
-    return (colors ** 2.2).astype(np.float32)
+    return TONES[np.clip(np.float32(STEPS) * share, 0, STEPS + 1).astype(np.int32)]
 
 
 #: Colours of `heat` as a screen shows them.
 HEAT = np.array([(0, 0, 0), (0.16, 0.07, 0.35), (0.47, 0.11, 0.43), (0.77, 0.23, 0.31), (0.95, 0.47, 0.12), (0.98, 0.77, 0.23),
                  (0.99, 0.98, 0.75)])
+STEPS = 1 << 12     # in which it is looked up: a fraction of what a screen shows
+_PLACES = np.arange(STEPS + 2) / STEPS
+TONES = np.stack([np.interp(_PLACES, np.linspace(0, 1, len(HEAT)), column, right=1.0) for column in HEAT.T], axis=-1) ** 2.2
+TONES = TONES.astype(np.float32)
