@@ -113,24 +113,27 @@ class Renderer:
 
     def _begin(self, request: RenderRequest, composed: Plan, geometry: Geometry, coarse: bool, deadline: float | None) -> Render:
         """A new picture, from what is left of the one before."""
-        before, pace, edits, goes_on, memory = self._render, self._pace, frozenset(), False, None
-        if self._keep:
-            memory = Memory()
-            if before is not None:
-                what = change(before.request, request, before.tracer.geometry.leaves, geometry.leaves)
-                edits, goes_on = what.edits, what.extent("light") == KEPT and before.can_go_on(request, composed)
-                if what.extent("hits") != ANEW:
-                    memory = self._remember(before, what, geometry, request.scene)
-        if before is not None and "nodes" in edits:
-            pace.forget()
+        before, pace, memory, goes_on = self._render, self._pace, Memory() if self._keep else None, False
+        what = Change(frozenset(), ())
+        if self._keep and before is not None:
+            what = change(before.request, request, before.tracer.geometry.leaves, geometry.leaves)
+            goes_on = what.extent("light") == KEPT and before.can_go_on(request, composed)
+            if what.extent("hits") != ANEW:
+                memory = self._remember(before, what, geometry, request.scene)
+            if "nodes" in what.edits:
+                pace.forget()
         edge = before.edge if memory is not None and memory.tiles or goes_on else pace.edge()
         first, soon, size = COARSEST, PARTIAL, request.settings.size
         if deadline is not None:
             soon = max(deadline - pace.frame, deadline / 4)
             known = memory is not None and all(memory.covers(tiles(one, *size, edge)) for one in passes(coarse))
-            first = pace.finest(size[0] * size[1], self._threads, max(deadline, KNOWN) if known else deadline, known)
+            if known:
+                deadline = max(deadline, KNOWN)
+                if all(what.extent(step) == KEPT for step in ("hits", "onward", "shadows")):
+                    soon = max(soon, KNOWN)     # nothing is to be traced: whole pictures, though they be a little late
+            first = pace.finest(size[0] * size[1], self._threads, deadline, known)
         return Render(request, composed, geometry, pace, self._pool, Start(
-            before, edits, memory, coarse, first, edge, soon, goes_on, self._threads))
+            before, what.edits, memory, coarse, first, edge, soon, goes_on, self._threads))
 
     def _remember(self, before: Render, what: Change, geometry: Geometry, scene: Scene) -> Memory:
         """What was kept of the picture before, as far as it still holds."""
@@ -141,7 +144,7 @@ class Renderer:
             if None in boxes:       # it has no end, or no extent
                 return Memory()
             corners = np.array(boxes, np.float64).reshape(-1, 2, 3)
-            margin = MARGIN * np.abs(corners).max(axis=1, initial=0)
+            margin = MARGIN * np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
             grown = np.concatenate([corners[:, 0] - margin, corners[:, 1] + margin], axis=1) if len(corners) else NO_BOXES
             through = any(old.leaves[index].visible and old.leaves[index].material.transmission > 0 for index in what.leaves)
             memory.renumber(renumbering(old, geometry, what.leaves, UNKNOWN), through, grown)
