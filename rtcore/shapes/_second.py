@@ -32,9 +32,13 @@ class Near(NamedTuple):
     a: object
     b: object
     c: object
-    blur: object        # bound on the error of a
+    blur: object        # bounds on their errors
+    blur_b: object
+    blur_c: object
     off: object         # discriminant
     fuzz: object        # bound on its error
+    foot: object        # the closest approach
+    way: object         # the direction
     far: object         # what the error of the ray's origin in unit space is a rounding of
     speed: object       # bound on the length of its direction there
     reach: object       # |x| + |y| + |z| of the closest approach
@@ -69,7 +73,7 @@ def approach(ray, i, exact, q, most, curved):
     blur, blur_b, blur_c = 32 * U64 * curved * speed * speed, 32 * U64 * speed * (far + 1), 64 * U64 * (far + 1) * (reach + 1)
     off = difference(b, b, a, c)
     fuzz = 2 * size(b) * blur_b + size(a) * blur_c + size(c) * blur + blur * blur_c + blur_b * blur_b + 4 * U64 * size(off)
-    return Near(shift, a, b, c, blur, off, fuzz, far, speed, reach)
+    return Near(shift, a, b, c, blur, blur_b, blur_c, off, fuzz, n, d, far, speed, reach)
 
 
 @inline
@@ -153,66 +157,81 @@ def within(p, low, high, margin):
 
 
 @inline
-def choose(todo, near, m, f, f1, v, v1, far, low, high, part, limit, start, end, side, like, where):
-    """Where the lanes `todo` first meet the surface: t, the lanes that do, those for which that is not certain. part: which part of the
-    form belongs to it, low and high being the box's corners, or low the slab's vector; none of it is further than `limit` from the origin.
-    where: see `_ball.choose`."""
-    w = -(near.b + with_sign(root(near.off), near.b))
-    s0, s1 = w / near.a, near.c / w
-    lead = size(near.a) + near.blur
-    gone = lead <= 0        # the root w/a is nowhere as a is 0, or lies beyond the limit
-    if part != EVERYWHERE:
-        gone = gone | (lead * (near.reach + limit) < size(w) * root(dot(v, v)))
-    sure = (near.off > GONE * near.fuzz) & (gone | (size(near.a) > GONE * near.blur))
-    unsure = todo & ~sure
-    todo = todo & sure
-    slack = 2.0 ** -6 * (size(s0) + size(s1))
-    t0, t1 = select(gone, np.inf, s0 + near.shift), s1 + near.shift
-    swap = t1 < t0
-    t = 0 * w
-    found = todo & ~todo
-    for k in range(2):
-        guess = select(swap, t1, t0) if k == 0 else select(swap, t0, t1)
-        want = todo & (guess + slack > start) & (guess - slack < end) & (guess < np.inf)
-        if not where and side & (FRONT | BACK) == 0:
-            hit = want & (guess - slack > start) & (guess + slack < end)
-            if part != EVERYWHERE:
-                p, margin = along(f, guess, v), near.speed * slack + 8 * U64 * (limit + near.reach)
-                inside, maybe = between(p, low, margin) if part == IN_SLAB else within(p, low, high, margin)
-                hit, want = hit & inside, want & maybe
-            t, found, todo, want = select(hit, guess, t), found | hit, todo & ~hit, want & ~hit
-        if any_lane(want):
-            r, slope, left, p = polish(m, near, f, f1, v, v1, far, guess)
-            steep = size(slope)
-            ok = certain(r, steep, left, start, end)
-            hit = want & ok & (wide(rounded(r, like)) > start) & (r < end)
-            if part != EVERYWHERE:
-                margin = 8 * U64 * (limit + near.reach) + near.speed * (left / steep + 2 * U64 * size(r))
-                inside, maybe = within(p, low, high, margin)
-                if part == IN_SLAB:
-                    inside, maybe = between(p, low, margin)
-                ok = ok & (inside | ~maybe)
-                hit = hit & inside
-            if side & FRONT:
-                hit = hit & (slope < 0)
-            elif side & BACK:
-                hit = hit & (slope > 0)
-            unsure = unsure | (want & ~ok)
-            hit = hit & ok
-            t = select(hit, r, t)
-            found = found | hit
-            todo = todo & ok & ~hit | (todo & ~want)
-    return t, found, unsure
+def placed(near, s, margin, low, high, part, limit):
+    """Lanes whose point at s from the closest approach, plainly and off by `margin`, surely belongs to the part of the form that counts,
+    and those whose point may."""
+    p, margin = along(near.foot, s, near.way), near.speed * margin + 64 * U64 * (near.far + limit + near.reach)
+    return between(p, low, margin) if part == IN_SLAB else within(p, low, high, margin)
 
 
 @inline
 def meet(ray, i, exact, q, most, part, limit, todo, near, side, where):
-    """`choose` for surface q; t in the rays' precision."""
-    f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
-    end, far = load(ray, T, i), near.far + most * extent(splat3(exact, q, PLACE))
-    t, found, unsure = choose(todo, near, form_of(exact, q, 0 * f.x), f, f1, v, v1, far, splat3(exact, q, BOX), splat3(exact, q, BOX + 3),
-                              part, limit, wide(load(ray, START, i)), until(ray, i), side, end, where)
-    return rounded(t, end), found, unsure
+    """Where the lanes `todo` first meet surface q: t in the rays' precision, the lanes that do, those for which that is not certain. part:
+    which part of the form belongs to it; none of it is further than `limit` from the origin. where: see `_ball.choose`."""
+    start, end, like = wide(load(ray, START, i)), until(ray, i), load(ray, T, i)
+    low, high = splat3(exact, q, BOX), splat3(exact, q, BOX + 3)    # the box's corners, or the slab's vector and nothing
+    half = root(near.off)
+    w = -(near.b + with_sign(half, near.b))
+    s0, s1 = w / near.a, near.c / w
+    lead = size(near.a) + near.blur
+    gone = lead <= 0        # the root w/a is nowhere as a is 0, or lies beyond the limit
+    if part != EVERYWHERE:
+        gone = gone | (lead * (near.reach + limit) < size(w) * root(dot(near.way, near.way)))
+    sure = (near.off > GONE * near.fuzz) & (gone | (size(near.a) > GONE * near.blur))
+    unsure = todo & ~sure
+    todo = todo & sure
+    # twice what the errors of a, b, c leave of the roots
+    blur_w = near.blur_b + near.fuzz / half
+    slack0 = 2 * (blur_w + size(s0) * near.blur) / size(near.a) + 8 * U64 * (size(s0) + size(near.shift))
+    slack1 = 2 * (near.blur_c + size(s1) * blur_w) / size(w) + 8 * U64 * (size(s1) + size(near.shift))
+    swap = ~gone & (s0 < s1)
+    first, last = select(swap, s0, s1), select(gone, np.inf, select(swap, s1, s0))
+    slack, slack_last = select(swap, slack0, slack1), select(gone, 0, select(swap, slack1, slack0))
+    guess, guess_last = first + near.shift, last + near.shift
+    want = todo & (guess + slack > start) & (guess - slack < end)
+    want_last = todo & (guess_last + slack_last > start) & (guess_last - slack_last < end)
+    inside, inside_last = want, want_last
+    if part != EVERYWHERE:
+        inside, maybe = placed(near, first, slack, low, high, part, limit)
+        inside_last, maybe_last = placed(near, last, slack_last, low, high, part, limit)
+        want, want_last = want & maybe, want_last & maybe_last
+    t = guess
+    found = todo & ~todo
+    if not where and side & (FRONT | BACK) == 0:
+        found = want & inside & (guess - slack > start) & (guess + slack < end)
+        hit = want_last & inside_last & (guess_last - slack_last > start) & (guess_last + slack_last < end)
+        t = select(found, guess, guess_last)
+        found = found | hit
+        want, want_last = want & ~found, want_last & ~found
+    if any_lane(want | want_last):
+        m = form_of(exact, q, 0 * w)
+        f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+        far = near.far + most * extent(splat3(exact, q, PLACE))
+        for k in range(2):
+            if k == 1:
+                want = want_last & ~found & ~unsure
+                guess = guess_last
+            if any_lane(want):
+                r, slope, left, p = polish(m, near, f, f1, v, v1, far, guess)
+                steep = size(slope)
+                ok = certain(r, steep, left, start, end)
+                hit = want & ok & (wide(rounded(r, like)) > start) & (r < end)
+                if part != EVERYWHERE:
+                    margin = 8 * U64 * (limit + near.reach) + near.speed * (left / steep + 2 * U64 * size(r))
+                    inside, maybe = within(p, low, high, margin)
+                    if part == IN_SLAB:
+                        inside, maybe = between(p, low, margin)
+                    ok = ok & (inside | ~maybe)
+                    hit = hit & inside
+                if side & FRONT:
+                    hit = hit & (slope < 0)
+                elif side & BACK:
+                    hit = hit & (slope > 0)
+                unsure = unsure | (want & ~ok)
+                hit = hit & ok
+                t = select(hit, r, t)
+                found = found | hit
+    return rounded(t, like), found, unsure
 
 
 # --- the slow way ---
