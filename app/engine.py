@@ -26,6 +26,7 @@ class Job(NamedTuple):
     size: tuple[int, int]       # width, height in pixels of the picture
     continues: bool = False     # a step of the same drag as the job before: that one may still show its first pass
     document: int = 0           # counts opened files: kernels are compiled anew only for another one
+    anew: bool = False          # from its start, though there may be something to go on from
 
     def looks_like(self, other: "Job") -> bool:
         """Whether both come to the same picture, at most shown otherwise; scenes are told apart by identity, as everywhere."""
@@ -68,6 +69,10 @@ class Engine:
     def frames(self, request: "RenderRequest", cancelled: Callable[[], bool], dragged: bool) -> "Iterator[Frame]":
         """The passes of a picture, from coarse to fine; the first one in time for the eye to take it for an answer, or for a motion."""
         return self._renderer.frames(request, cancelled, deadline=MOTION if dragged else ANSWER)
+
+    def forget(self):
+        """Make the next picture from its start."""
+        self._renderer.forget()
 
     def encode(self, pixels: np.ndarray, out: np.ndarray, gain: float):
         """Linear light, multiplied by the gain, into the bytes of QImage.Format_RGB32."""

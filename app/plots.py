@@ -121,6 +121,7 @@ class Figure(pg.GraphicsLayoutWidget):
         for side, text in (("bottom", bottom), ("left", left)):
             axis = plot.getAxis(side)
             axis.setStyle(tickFont=font, tickTextOffset=round(style.letters * 0.4))
+            axis.enableAutoSIPrefix(False)
             axis.setPen(style.faint)
             axis.setTextPen(style.ink)
             axis.setLabel(text, **{"color": style.ink, "font-size": f"{round(style.letters * 0.95)}px"})

@@ -305,8 +305,8 @@ class Session(QObject):
 
     # frames
 
-    def submit(self, continues: bool = False):
-        """Ask the worker for the picture as things stand now."""
+    def submit(self, continues: bool = False, anew: bool = False):
+        """Ask the worker for the picture as things stand now; `anew`: from its start, whatever is known of it."""
         if self.camera is None or not all(self._size):
             return
         number = next(self._numbers)
@@ -314,7 +314,7 @@ class Session(QObject):
             self._floor = number
         scale = self.options.scale
         size = tuple(max(16, round(side * scale)) for side in self._size)
-        self.worker.submit(Job(number, self.scene, self.camera, self.options, size, continues, self._opened))
+        self.worker.submit(Job(number, self.scene, self.camera, self.options, size, continues, self._opened, anew))
 
     @Slot()
     def _take_frame(self):

@@ -132,6 +132,8 @@ class Worker(QObject):
             with self._wake:
                 if self._next is not None or self._closing:
                     return      # somebody moved on while the helper worked
+        if job.anew:
+            engine.forget()
         started, shown, whole = time.monotonic(), 0, False
 
         def cancelled() -> bool:
@@ -147,7 +149,7 @@ class Worker(QObject):
                 break
         if whole and not frame.done:
             with self._wake:
-                self._halted = job
+                self._halted = job._replace(anew=False)
 
     def _compile(self, names: list[str]):
         def progress(state: Compiling | None):

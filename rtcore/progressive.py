@@ -56,6 +56,10 @@ class Renderer:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
 
+    def forget(self) -> None:
+        """Make the next picture from its start, whatever could be kept of the one before."""
+        self._render = None
+
     @property
     def progress(self) -> float:
         """How far the current request is, 0 .. 1; any thread may ask."""

@@ -34,7 +34,7 @@ class ConvergencePanel(Panel):
         self.referring.setParent(self)
         self.referring.progressed.connect(self._progress)
         self.referring.ended.connect(self._referred)
-        self.again = button("Run again", "Render the picture from its start", self._again)
+        self.again = button("Run again", "Render the picture from its start, with nothing known of it", self._again)
         self.refer = button("Reference", "Render a reference in the background, so that the true error is known", self._refer)
         self.samples = QComboBox()
         self.samples.addItems([f"{n} samples" for n in SAMPLES])
@@ -181,7 +181,7 @@ class ConvergencePanel(Panel):
     def _again(self):
         if self.run is not None and self.run.done:
             self.run = None
-            self.session.submit()
+            self.session.submit(anew=True)
 
     def _pin(self):
         if self.run is not None:

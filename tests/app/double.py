@@ -38,7 +38,7 @@ class Double:
     def __init__(self, pause: float = 0.0, spacings=(4, 1), names=()):
         self.pause, self.spacings, self.names = pause, spacings, list(names)
         self.jobs: list[Job] = []
-        self.closed = False
+        self.closed, self.forgotten = False, 0
         self.fail: Exception | None = None
 
     def request(self, job: Job) -> Job:
@@ -64,6 +64,9 @@ class Double:
             yield Frame(number, len(self.spacings), spacing, int(spacing == 1), pixels, node, distance, {"primary": node.size},
                         time.monotonic() - started + 1e-6, last, plan(job.scene, Settings(size=job.size, **job.options.settings())),
                         {("primary rays", "core"): 0.25, ("hits: sphere", "sphere"): 0.75}, {"shapes": 1024})
+
+    def forget(self):
+        self.forgotten += 1
 
     def encode(self, pixels: np.ndarray, out: np.ndarray, gain: float):
         out[..., 3] = 255

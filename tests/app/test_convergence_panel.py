@@ -200,9 +200,9 @@ def test_runs_are_saved_as_table_and_picture(panel, session, qtbot, tmp_path, mo
 
 def test_run_again_starts_over(panel, session, double, qtbot):
     play(session, FALLING)
-    asked = len(double.jobs)
+    asked, forgotten = len(double.jobs), double.forgotten
     panel.again.click()
-    qtbot.waitUntil(lambda: len(double.jobs) == asked + 1, timeout=3000)
+    qtbot.waitUntil(lambda: len(double.jobs) == asked + 1 and double.forgotten == forgotten + 1, timeout=3000)
 
 
 def test_light_and_dark(panel, session, qtbot):
