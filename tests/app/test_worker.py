@@ -100,7 +100,7 @@ def test_a_pause_lets_every_pixel_have_a_sample_and_resuming_goes_on(start, qtbo
     assert len(frames) <= 2 and not frames[-1].done     # a frame that nobody took in time is replaced by the next
     worker.pause(False)
     qtbot.waitUntil(lambda: frames[-1].done)
-    assert len(double.jobs) == 2 and double.jobs[0] is double.jobs[1]
+    assert len(double.jobs) == 2 and double.jobs[0] == double.jobs[1]
     worker.pause(True)
     worker.submit(job(scene, 2))        # a change while paused: its first sample, no more
     qtbot.waitUntil(lambda: frames[-1].samples == 1 and not frames[-1].done)
