@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from numba.core.caching import NullCache
 
-from rtcore import Box, Scene, Sphere, Triangle, intersect
+from rtcore import Box, Camera, Material, Node, Point, Scene, Sphere, Triangle, eye, film, intersect, render, shading
 from rtcore.jit import kernel
+from rtcore.lights import point
+from rtcore.shapes import sphere, triangle
 
-ARM, X86 = ("aarch64", "arm64"), ("x86_64", "AMD64")
+FAMILY = {"aarch64": "arm", "arm64": "arm", "x86_64": "x86", "AMD64": "x86"}.get(platform.machine())
 PACKED = {
     "arm": re.compile(r"^\s+f(?:add|sub|mul|div|mla|mls|maxnm|minnm|max|min|cm\w\w|abs)\s+v\d+\.(?:2d|4s)", re.MULTILINE),
     "x86": re.compile(r"^\s+v?(?:add|sub|mul|div|max|min|cmp\w*|fn?m(?:add|sub)\d+)p[sd]\s", re.MULTILINE)}
@@ -27,23 +29,40 @@ SHAPES = {Sphere((0, 0, 0), 1): 300, Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)): 
 CASES = [pytest.param(shape, least, precision, id=f"{type(shape).__name__}-{precision}")
          for shape, least in SHAPES.items() for precision in ("f32", "f64")]
 
+#: The same of what else a picture goes through, and how many on single numbers there may be: films have a way for pixels apart, spheres
+#: one for the angles of texture coordinates.
+STAGES = {eye.cast: (38, 20), film.deposit: (4, 30), film.commit: (15, 30), shading.glow: (33, 8), shading.gather: (2, 32),
+          shading.bounce: (110, 4), point.shine: (90, 4), sphere.surface: (28, 70), triangle.surface: (110, 4)}
+
+
+def afresh(cached, precision: str) -> tuple[str, str, str]:
+    """The name, the assembly and the intermediate code of a kernel that has run; code from the cache can't be looked at."""
+    fresh = kernel(cached.py_func)
+    fresh._cache = NullCache()
+    fresh.compile(next(types for types in cached.signatures if f"float{precision[1:]}" in str(types[0])))
+    name = fresh.overloads[fresh.signatures[0]].fndesc.llvm_func_name
+    return name, fresh.inspect_asm(fresh.signatures[0]), fresh.inspect_llvm(fresh.signatures[0])
+
 
 @pytest.fixture(scope="module")
 def compiled():
-    """(shape, precision) -> the name, the assembly and the intermediate code of its kernel. Code from the cache can't be looked at."""
+    """(shape, precision) -> `afresh` of its kernel."""
     found = {}
 
     def look(shape, precision):
         if (shape, precision) not in found:
-            cached = shape.kind(np.eye(4)).intersect
             intersect(Scene(objects=(shape,)), np.zeros((8, 3)), np.ones((8, 3)), precision=precision)
-            fresh = kernel(cached.py_func)
-            fresh._cache = NullCache()
-            fresh.compile(next(types for types in cached.signatures if f"float{precision[1:]}" in str(types[0])))
-            name = fresh.overloads[fresh.signatures[0]].fndesc.llvm_func_name
-            found[shape, precision] = name, fresh.inspect_asm(fresh.signatures[0]), fresh.inspect_llvm(fresh.signatures[0])
+            found[shape, precision] = afresh(shape.kind(np.eye(4)).intersect, precision)
         return found[shape, precision]
     return look
+
+
+@pytest.fixture(scope="module")
+def rendered():
+    """A picture that needs all of STAGES has been made."""
+    glass = Material(reflection=0.5, transmission=0.5)
+    things = [Node(shape=Sphere((0, 0, 0), 1), material=glass), Triangle((-2, -1, -2), (2, -1, -2), (0, -1, 2))]
+    render(Scene(objects=things, lights=[Point(position=(3, 4, 5))], camera=Camera(lookfrom=(0, 1, 4))), (16, 16))
 
 
 def own_part(assembly: str, name: str) -> str:
@@ -53,20 +72,33 @@ def own_part(assembly: str, name: str) -> str:
     return assembly[start:start + end.start()]
 
 
+def instructions(assembly: str, name: str) -> tuple[int, int]:
+    """How many of a kernel's instructions compute with vectors, and how many with single numbers."""
+    if FAMILY is None:
+        pytest.skip(f"knows the instructions of x86 and ARM, not of {platform.machine()}")
+    text = own_part(assembly, name)
+    return len(PACKED[FAMILY].findall(text)), len(SINGLE[FAMILY].findall(text))
+
+
 @pytest.mark.parametrize("shape, least, precision", CASES)
 def test_hot_kernels_compute_in_packed_instructions(compiled, shape, least, precision):
-    machine = platform.machine()
-    if machine not in ARM + X86:
-        pytest.skip(f"knows the instructions of x86 and ARM, not of {machine}")
-    family = "arm" if machine in ARM else "x86"
     name, assembly, _ = compiled(shape, precision)
-    text = own_part(assembly, name)
-    packed, single = len(PACKED[family].findall(text)), len(SINGLE[family].findall(text))
+    packed, single = instructions(assembly, name)
     assert packed >= least
     assert packed >= 2 * single, f"{single} instructions on single numbers beside {packed} packed ones"
-    if family == "x86" and "ymm" in assembly:
-        lines = [line for line in text.splitlines() if PACKED["x86"].match(line)]
+    if FAMILY == "x86" and "ymm" in assembly:
+        lines = [line for line in own_part(assembly, name).splitlines() if PACKED["x86"].match(line)]
         assert sum(bool(WIDE.search(line)) for line in lines) > 0.9 * len(lines), "vectors of four numbers only"
+
+
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: f"{stage.py_func.__module__.removeprefix('rtcore.')}.{stage.py_func.__name__}")
+def test_other_stages_do_too(rendered, stage):
+    name, assembly, code = afresh(stage, "f64")
+    packed, single = instructions(assembly, name)
+    least, most = STAGES[stage]
+    assert packed >= least and single <= most, (packed, single)
+    blocks = blocks_of(code, name)
+    assert not [label for label in in_loops(blocks) if any("@NRT_incref" in line for line in blocks[label])]
 
 
 def blocks_of(code: str, name: str) -> dict[str, list[str]]:
