@@ -123,8 +123,8 @@ class Session(QObject):
         self._merge = gesture
         self.camera = camera
         self.views.visit(camera, gesture)
+        self.submit(continues)      # first: then it is rendered while the panels tell of it
         self.camera_changed.emit()
-        self.submit(continues)
 
     def orbit(self, right: float, up: float, gesture: object):
         self._try_move(moves.orbit, right, up, gesture=gesture)
@@ -161,8 +161,8 @@ class Session(QObject):
 
     def _look(self, camera: Camera):
         self.camera, self._merge = camera, None
-        self.camera_changed.emit()
         self.submit()
+        self.camera_changed.emit()
 
     def frame_all(self):
         """Draw the camera back until every bounded shape is in the picture."""
@@ -211,8 +211,8 @@ class Session(QObject):
         if options != self.options:
             self.options = options
             self._tell_outline()
-            self.options_changed.emit()
             self.submit(continues)
+            self.options_changed.emit()
 
     def switch(self, name: str, on: bool):
         """Turn shadows, fog or reflections on or off in the picture."""
