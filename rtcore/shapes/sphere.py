@@ -256,5 +256,5 @@ def _bounds_ellipsoid(data, extra):
     return placed_bounds(data, np.sqrt((forward(data) ** 2).sum(2)))
 
 
-SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()), leaf_most=2)
+SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()))
 ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, (Sphere((0, 0, 0), 1), (Scale((1, 2, 3)),)))
