@@ -66,6 +66,15 @@ class Watch:
             self.look()
             time.sleep(LOOK)
 
+    def views(self, since: float, until: float) -> list[float]:
+        """When another view came, and not only a finer picture of the same."""
+        times, last = [], NONE
+        for when, x in self.seen:
+            if not abs(x - last) < STEP:
+                last = x
+                times += [when] if since <= when <= until else []
+        return times
+
     def reached(self, place: float, since: float, side: int) -> float:
         """When the marker was first at a place, or beyond it in the direction of the drag, in ms; inf if never."""
         return next((1000 * (when - since) for when, x in self.seen if when >= since and side * (x - place) >= -NEAR), np.inf)
@@ -112,8 +121,7 @@ def measure(hands: Hands, eyes: Eyes, fingers: Fingers, scene: Scene, middle) ->
         watch.until(time.perf_counter() + 0.6)
         fingers.press(False)
         steps += [watch.reached(place(pixels), moved, side * onward) for moved, pixels in moves]
-        changes = [when for when, _ in watch.seen if moves[0][0] <= when <= moves[-1][0]]
-        between += (1000 * np.diff(changes)).tolist()
+        between += (1000 * np.diff(watch.views(moves[0][0], moves[-1][0]))).tolist()
     return {"move from rest": np.array(rest), "step of a drag": np.array(steps), "between pictures": np.array(between)}
 
 
