@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from rtcore.progressive import Frame, RenderRequest
 
 
-ANSWER, MOTION = 0.1, 1 / 30    # seconds within which the first picture of a change is to be seen, and that of a step of a drag
+SHOWN = 0.013                   # seconds from a picture to the screen: its bytes, the window's thread, painting
+ANSWER, MOTION = 0.1 - SHOWN, 1 / 30 - SHOWN        # within which the first picture of a change is to be made, and that of a step of a drag
 
 
 class Job(NamedTuple):
