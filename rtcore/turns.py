@@ -57,13 +57,14 @@ def push(tc, stack, slot, top, at, link, row, met):
 @intrinsic
 def prefetch_either(tc, which, x, i, y, z, j):
     """Have the processor fetch what will be read soon: the first four cache lines of row i of x if `which`, else the first two of row j of
-    y and of row j of z. All 2-D, C-contiguous."""
+    y and of row j of z, or four of y where z has no columns. All 2-D, C-contiguous."""
     def gen(ctx, b, sig, args):
         def place(k, row):
             array = ctx.make_array(sig.args[k])(ctx, b, args[k])
             columns = cgutils.unpack_tuple(b, array.shape)[1]
-            return b.bitcast(b.gep(array.data, [b.mul(row, columns)]), I8.as_pointer())
-        node, first, second = place(1, args[2]), place(3, args[5]), place(4, args[5])
+            return b.bitcast(b.gep(array.data, [b.mul(row, columns)]), I8.as_pointer()), columns
+        (node, _), (first, _), (second, columns) = place(1, args[2]), place(3, args[5]), place(4, args[5])
+        second = b.select(b.icmp_signed("==", columns, I64(0)), b.gep(first, [I32(128)]), second)
         t = ir.FunctionType(ir.VoidType(), [node.type, I32, I32, I32])
         function = cgutils.get_or_insert_function(b.module, t, "llvm.prefetch.p0i8")
         for line in range(4):

@@ -38,8 +38,9 @@ SLOTS = 8               # rays walked in turns; a power of two
 BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6, 9, 12, 13, 14, 15
 BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
 
-#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than that; others scatter.
-STRAIGHT, SPREAD = np.float32(0.4), np.float32(0.05)
+#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than SPREAD, or WIDE where rays that scatter
+#: would be walked singly; others scatter.
+STRAIGHT, SPREAD, WIDE = np.float32(0.4), np.float32(0.05), np.float32(0.35)
 
 
 class Walk(NamedTuple):
@@ -144,9 +145,10 @@ def begin(walk, rays, start, n, tree, singly):
         # the axis along which all rays go the same way, and furthest
         along_x, along_y, along_z = _common(x0, x1), _common(y0, y1), _common(z0, z1)
         axis = 0 if along_x >= along_y and along_x >= along_z else 1 if along_y >= along_z else 2
-        state[MODE] = BEAM
-        if not max(along_x, max(along_y, along_z)) >= STRAIGHT or not _bundle(walk, axis, largest(fuzz), groups):
-            if NODE * singly <= tree.link.shape[0]:
+        state[MODE], large = BEAM, NODE * singly <= tree.link.shape[0]
+        straight = max(along_x, max(along_y, along_z)) >= STRAIGHT
+        if not straight or not _bundle(walk, axis, largest(fuzz), groups, WIDE if large else SPREAD):
+            if large:
                 state[MODE], state[RUNNING] = SINGLY, SLOTS
                 for k in range(SLOTS):
                     walk.slots[k, 0], walk.slots[k, 1] = 0, 0
@@ -166,9 +168,9 @@ def _common(low, high):
 
 
 @inline
-def _bundle(walk, axis, fuzz, groups):
+def _bundle(walk, axis, fuzz, groups, most):
     """The beam around a packet's rays, which all run the same way along `axis` and are off by `fuzz` at most; whether it is narrow enough
-    to be walked."""
+    to be walked, slopes differing by `most` at most."""
     coarse, beam = walk.coarse, walk.beam
     much = splat(np.float32(1e30))
     x0, y0, z0, x1, y1, z1 = much, much, much, -much, -much, -much
@@ -203,7 +205,7 @@ def _bundle(walk, axis, fuzz, groups):
     sign = beam[SIGN]
     beam[ENTER] = -sign * (beam[BEAM_TO + axis] if sign > 0 else beam[BEAM_FROM + axis])
     beam[LEAVE] = -sign * (beam[BEAM_FROM + axis] if sign > 0 else beam[BEAM_TO + axis])
-    return spread <= SPREAD and fuzz < 1     # far more than that, and bounds would not be finite
+    return spread <= most and fuzz < 1     # far more than that, and bounds would not be finite
 
 
 @inline
