@@ -6,7 +6,11 @@ from rtcore.scene import Leaf, Scene
 
 def leaf_bounds(leaf: Leaf) -> tuple[np.ndarray, np.ndarray] | None:
     """Low and high corner (3,) of a leaf in the world, or None for an unbounded shape."""
-    packed = leaf.shape.pack(leaf.matrix)
+    return packed_bounds(leaf.shape.pack(leaf.matrix))
+
+
+def packed_bounds(packed) -> tuple[np.ndarray, np.ndarray] | None:
+    """The same of what a leaf was packed to."""
     if packed.kind.bounds is None or not len(packed.data):
         return None
     low, high = packed.kind.bounds(packed.data, packed.extra)

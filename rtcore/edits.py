@@ -7,6 +7,7 @@ from typing import NamedTuple
 import msgspec
 
 from rtcore.camera import Camera
+from rtcore.fields import Record
 from rtcore.lights import SHINE, STUDIO
 from rtcore.scene import Leaf, Light, Scene
 from rtcore.settings import Settings
@@ -29,7 +30,7 @@ class Edit(NamedTuple):
 EDITS = (
     Edit("view", "what the picture shows of the samples", KEPT, KEPT, KEPT, KEPT),
     Edit("exposure", "how bright the screen shows them", KEPT, KEPT, KEPT, KEPT),
-    Edit("samples", "samples, time, error to stop at; region, threads", KEPT, KEPT, KEPT, KEPT),
+    Edit("samples", "samples, time, error to stop at; region, threads; names", KEPT, KEPT, KEPT, KEPT),
     Edit("fog", "the fog, its switch", KEPT, KEPT, KEPT, ANEW),
     Edit("background", "the background", KEPT, KEPT, KEPT, ANEW),
     Edit("shadows", "the switch of shadows", KEPT, KEPT, KEPT, ANEW),
@@ -101,13 +102,23 @@ def casting(scene: Scene) -> frozenset[tuple]:
     return frozenset(shadow_key(light) for light in (STUDIO if scene.lights is None else scene.lights) if type(light) in SHINE)
 
 
+def _bare(record: Record) -> Record:
+    """A record without its name and note, which no picture shows."""
+    said = {field: "" for field in ("name", "note") if hasattr(record, field)}
+    return msgspec.structs.replace(record, **said) if said else record
+
+
+def _bare_lights(scene: Scene) -> list[Light]:
+    return [_bare(light) for light in (STUDIO if scene.lights is None else scene.lights)]
+
+
 def _scene(old: Scene, new: Scene) -> set[str]:
     edits = set()
     if old.fog != new.fog:
         edits.add("fog")
     if old.background != new.background:
         edits.add("background")
-    if old.lights != new.lights:
+    if _bare_lights(old) != _bare_lights(new):
         edits.add("light" if casting(old) == casting(new) else "move_light")
     return edits
 
@@ -119,7 +130,7 @@ def _leaf(a: Leaf, b: Leaf) -> set[str]:
         edits.add("hide")
     elif a.visible and (a.shape is not b.shape or a.matrix.tobytes() != b.matrix.tobytes()):
         edits.add("shape")
-    if a.material is not b.material and a.material != b.material:
+    if a.material is not b.material and _bare(a.material) != _bare(b.material):
         edits.add("material")
         if a.material.transmission != b.material.transmission:
             edits.add("opacity")

@@ -191,8 +191,8 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
             c = film.count[p]
             for k in range(3):
                 pixels[y, x, k] = film.total[p, k] / c if c > 0 else 0.0
-            node[y, x] = leaf[film.prim[p]] if film.prim[p] >= 0 else -1
-            distance[y, x] = film.distance[p]
+            node[y, x] = leaf[film.prim[p]] if c > 0 and film.prim[p] >= 0 else -1
+            distance[y, x] = film.distance[p] if c > 0 else np.inf
 
 
 @kernel

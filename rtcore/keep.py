@@ -6,7 +6,7 @@ in the same order; one of a later level by the ray it comes from and the way it 
 changed, the tile goes through the same stages as ever, and where a ray is known, what it meets is looked up and not traced. What an edit
 leaves valid is said in `rtcore.edits`.
 
-Twelve bytes a ray (eight with float32) and four for each light that shone on it.
+Seventeen bytes a ray (thirteen with float32) and four for each light that shone on it.
 """
 import threading
 from collections.abc import Iterable
@@ -32,7 +32,8 @@ class Shade(NamedTuple):
 
 
 class Level:
-    """One wave of a tile."""
+    """One wave of a tile, n rays: int32 `source` (n) as `Wave` has it, 0 for the eye's; what they met, int32 `prim` (n), `t` (n) in the
+    render's precision, uint8 `doubt` (n), as `Rays` has them."""
 
     def __init__(self, source: np.ndarray, prim: np.ndarray, t: np.ndarray, doubt: np.ndarray):
         self.source, self.prim, self.t, self.doubt = source, prim, t, doubt
@@ -57,16 +58,17 @@ class Known(NamedTuple):
 
 @inline
 def _near(ray, i, far, boxes):
-    """Whether ray i comes into one of the boxes before `far`."""
+    """Whether ray i comes into one of the boxes before `far`, or passes as closely as float32 rays are off so far away."""
+    slack = 2.0 ** -20 * max(abs(ray[OX, i]), abs(ray[OX + 1, i]), abs(ray[OX + 2, i])) if ray.itemsize == 4 else 0.0
     for b in range(boxes.shape[0]):
-        enter, leave = 0.0, np.float64(far)
+        enter, leave = 0.0, np.float64(far) * (1 + 2.0 ** -20)
         for k in range(3):
             o, d = np.float64(ray[OX + k, i]), np.float64(ray[DX + k, i])
             if d == 0:
-                if o < boxes[b, k] or o > boxes[b, k + 3]:
+                if o < boxes[b, k] - slack or o > boxes[b, k + 3] + slack:
                     leave = -1.0
                 continue
-            p, q = (boxes[b, k] - o) / d, (boxes[b, k + 3] - o) / d
+            p, q = (boxes[b, k] - slack - o) / d, (boxes[b, k + 3] + slack - o) / d
             enter, leave = max(enter, min(p, q)), min(leave, max(p, q))
         if enter <= leave:
             return True
@@ -75,8 +77,8 @@ def _near(ray, i, far, boxes):
 
 @kernel
 def _recall(rays, was, prim, t, doubt, source, boxes, known):
-    """Give rays their known hits and let them be dead to the intersection kernels; `was`, a ray's column then, becomes -1 where nothing is
-    known. known: `Known`."""
+    """Give rays their known hits and let them be dead to the intersection kernels. was: int32 (n), a ray's column in the kept level's
+    arrays, becomes -1 where nothing is known; boxes (m, 6); known: int64 (4), as `Known`."""
     for i in range(len(was)):
         old = was[i]
         if old < 0 or prim[old] == UNKNOWN or _near(rays.ray, i, t[old], boxes):
@@ -113,13 +115,16 @@ def _note_shadows(beam, first, last, depth):
 
 
 @kernel
-def _renumber(prim, number):
-    """Primitives by their new numbers, UNKNOWN for those that are gone; returns whether there are such."""
+def _renumber(prim, doubt, number):
+    """Primitives by their new numbers, UNKNOWN for those that are gone, and for hits without a proof, which hang on what else the search
+    had met; returns whether there are such."""
     gone = False
     for i in range(len(prim)):
-        if prim[i] >= 0:
+        if doubt[i] != 0:
+            prim[i] = UNKNOWN
+        elif prim[i] >= 0:
             prim[i] = number[prim[i]]
-            gone |= prim[i] == UNKNOWN
+        gone |= prim[i] == UNKNOWN
     return gone
 
 
@@ -183,9 +188,9 @@ class Memory:
         moved = bool((number != np.arange(len(number))).any())
         for levels in self.tiles.values():
             for level in levels:
-                if moved:
+                if moved or level.doubt.any():
                     level.noted = False
-                    level.whole &= not _renumber(level.prim, number)
+                    level.whole &= not _renumber(level.prim, level.doubt, number)
                 if len(boxes):
                     level.boxes = np.concatenate([level.boxes, boxes])
                 for key, (depth, since) in level.shades.items():
@@ -193,6 +198,7 @@ class Memory:
                         _renumber_shade(depth, number, through)
                     if len(boxes):
                         level.shades[key] = Shade(depth, np.concatenate([since, boxes]))
+                level.shades = {key: shade for key, shade in level.shades.items() if len(shade.boxes) <= BOXES}
         if any(len(level.boxes) > BOXES for levels in self.tiles.values() for level in levels):
             self.tiles.clear()
             self._sizes.clear()
@@ -234,8 +240,6 @@ class Recall:
         else:
             parent = self._was[source >> 1]
             wanted = np.where(parent < 0, -1, 2 * parent + (source & 1)).astype(np.int32)
-        if len(old.source) == 0:
-            return np.full(len(source), -1, np.int32)
         at = np.minimum(np.searchsorted(old.source, wanted), len(old.source) - 1)
         return np.where(old.source[at] == wanted, at, -1).astype(np.int32)
 
@@ -245,6 +249,8 @@ class Recall:
         if self._was is None:       # all of it was known
             self.levels.append(self._kept[depth])
             return
+        if depth < len(self._kept):     # kernels that can doubt have begun anew, for known rays too
+            rays.doubt[:n] = np.where(self._was < 0, rays.doubt[:n], self._kept[depth].doubt[self._was])
         level = Level(np.zeros(n, np.int32) if depth == 0 else wave.source[:n].copy(), rays.prim[:n].copy(), rays.ray[T, :n].copy(),
                       rays.doubt[:n].copy())
         if depth < len(self._kept):

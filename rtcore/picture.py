@@ -76,8 +76,9 @@ class Render:
 
     def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, pool: ThreadPoolExecutor, start: Start):
         scene, camera, self.settings = self.request = request
-        before, self.edits, self.memory, coarse, first, self.edge, self.soon, goes_on, threads = start
+        before, self.edits, self.memory, self.coarse, first, self.edge, self.soon, goes_on, threads = start
         self.plan, self.pace, self.pool = composed, pace, pool
+        self.with_light = VIEW[self.settings.view].needs_light
         self.finished = False   # the pass
         self.tracing = False    # the pool is at it
         self._squared: np.ndarray | None = None
@@ -88,7 +89,7 @@ class Render:
         lens = camera.lens() if self.plan.lens else None
         self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
         # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
-        lit = coarse or VIEW[self.settings.view].needs_lit
+        lit = self.coarse or VIEW[self.settings.view].needs_lit
         self.gain = self.tracer.filter.gain if self.tracer.filter else 1.0
         signed = self.gain < 1
         reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit, signed)
@@ -103,10 +104,12 @@ class Render:
                 scratch.renew()
         else:
             self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
+            if goes_on:
+                self.scratches[0].counts += before.counts()
         self.recast = Recast(geometry, view, width, height)
         self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
         self.regions = [self.settings.region, None] if self.settings.region else [None]     # to be refined, one after the other
-        self.schedule = [*passes(coarse, first), *self._further()]
+        self.schedule = [*passes(self.coarse, first), *self._further()]
         numbers: dict[int, int] = {}
         self.materials = np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in geometry.leaves], np.int32)
         self.order: np.ndarray | None = None
@@ -128,8 +131,8 @@ class Render:
             return False
         if msgspec.structs.replace(settings, view=mine.view, seconds=mine.seconds) != mine:
             return False
-        if VIEW[settings.view].needs_light and not VIEW[mine.view].needs_light:
-            return False        # no light was traced
+        if VIEW[settings.view].needs_light and not self.with_light:
+            return False
         if VIEW[settings.view].needs_lit and not len(self.film.lit):
             return False
         return keep or not self.done or settings.view != self.settings.view
@@ -139,16 +142,16 @@ class Render:
         self.edits = frozenset(name for name, field in (("view", "view"), ("samples", "seconds"))
                                if getattr(self.settings, field) != getattr(request.settings, field))
         self.done = self.done and self.finished and "samples" not in self.edits
-        self.settings, self.prepared = request.settings, now - self.elapsed
+        self.request, self.settings, self.prepared = request, request.settings, now - self.elapsed
 
-    def can_go_on(self, request: RenderRequest, composed: Plan) -> bool:
+    def can_go_on(self, request: RenderRequest, composed: Plan, coarse: bool) -> bool:
         """Whether another request, with the same light, can take over the samples so far and come to the very picture that it would come to
         alone."""
-        if VIEW[request.settings.view].needs_light and not VIEW[self.settings.view].needs_light:
+        if VIEW[request.settings.view].needs_light and not self.with_light or coarse != self.coarse:
             return False
-        uniform = adaptive.FIRST if request.settings.adaptive else composed.samples
+        most = min(adaptive.FIRST, composed.samples) if self.adaptive or request.settings.adaptive else composed.samples
         lit, signed = len(self.film.lit) > 0, len(self.film.plain) > 0
-        return films.suits(self.film, composed.samples, lit, signed) and int(self.film.count.max()) <= uniform
+        return films.suits(self.film, composed.samples, lit, signed) and int(self.film.count.max()) <= most
 
     def trace(self, cancelled: Callable[[], bool]) -> Iterator[None]:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
@@ -183,7 +186,8 @@ class Render:
         self.finished = all(results)
         if one.samples == range(1):
             pixels = (share if self.finished else (next(self.done_tiles) - 1) * each) * size[0] * size[1]
-            self._note_pace(one.spacing, pixels, (time.perf_counter() - began) * len(shares), self.counts() - before)
+            if self.film.count.max(initial=0) <= 1:     # or the samples were there, and tiles were skipped
+                self._note_pace(one.spacing, pixels, (time.perf_counter() - began) * len(shares), self.counts() - before)
         if self.finished:
             self.spent = float(self.film.count.mean())
             if one.spacing == 1 and one.pixels is None and one.region is None:
@@ -242,6 +246,7 @@ class Render:
                 self.schedule.append(one)
             elif len(self.regions) > 1:
                 del self.regions[0]
+                self.converged = False
                 self.schedule += self._further()
             else:
                 return False

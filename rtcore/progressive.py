@@ -7,6 +7,7 @@ coarse passes. How fine the first lattice is depends on how soon it has to be se
 import os
 import sys
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -17,9 +18,9 @@ try:
 except ImportError:     # Windows
     resource = None
 
-from rtcore.bounds import leaf_bounds
+from rtcore.bounds import packed_bounds
 from rtcore.edits import ANEW, KEPT, TOUCHED, Change, casting, change
-from rtcore.flatten import DTYPES, Geometry, flatten, renumbering
+from rtcore.flatten import DTYPES, Geometry, flatten, packed, renumbering
 from rtcore.keep import NO_BOXES, UNKNOWN, Memory
 from rtcore.pace import Pace
 from rtcore.picture import PARTIAL, Frame as Frame, Render, RenderRequest, Start
@@ -49,9 +50,11 @@ class Renderer:
         self._kernels: set[str] = set()
         self._compile = self._prepare = 0.0
         self._pace = Pace()
+        self._running: Callable[[], Iterator[Frame] | None] = lambda: None
 
     def close(self) -> None:
         """End the threads."""
+        self._halt()
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
             self._pool = None
@@ -83,12 +86,24 @@ class Renderer:
         ends within some milliseconds and the iterator ends; `stats()` and `picture()` then tell of what was rendered so far. The same
         request again goes on from there, with another view too: then the first picture comes at once and nothing is traced twice.
         deadline: seconds from now after which the first picture should be seen; the first lattice is as fine as that allows."""
+        self._halt()
+        made = self._frames(request, cancelled, coarse, deadline)
+        self._running = weakref.ref(made)       # no more: who drops the iterator ends it
+        return made
+
+    def _halt(self) -> None:
+        """End an iterator that somebody still holds: its threads would go on writing to the film."""
+        if (running := self._running()) is not None:
+            running.close()
+
+    def _frames(self, request: RenderRequest, cancelled: Callable[[], bool], coarse: bool, deadline: float | None) -> Iterator[Frame]:
         start = time.perf_counter()
         composed = self._composed(request)
         loaded = time.perf_counter()
         threads = request.settings.threads or cores()
         if self._pool is None or self._threads != threads:
-            self.close()
+            if self._pool is not None:
+                self._pool.shutdown(cancel_futures=True)
             self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
         render = self._render
         if render is not None and render.answers(request, self._keep):
@@ -98,8 +113,9 @@ class Renderer:
         else:
             geometry = self.geometry(request.scene, request.settings.precision)
             left = None if deadline is None else max(deadline - (time.perf_counter() - start), deadline / 4)
-            self._render = render = self._begin(request, composed, geometry, coarse, left)
-            self._compile, self._prepare = loaded - start, render.prepared - loaded
+            before, self._render = render, None     # what is kept of it may be changed by then, if this fails
+            self._render = render = self._begin(before, request, composed, geometry, coarse, left)
+            self._compile, self._prepare = loaded - start, time.perf_counter() - loaded
         while not render.done:
             for _ in render.trace(cancelled):
                 if not cancelled():
@@ -115,13 +131,14 @@ class Renderer:
             yield render.frame(render.done)
             render.number += not render.done
 
-    def _begin(self, request: RenderRequest, composed: Plan, geometry: Geometry, coarse: bool, deadline: float | None) -> Render:
+    def _begin(self, before: Render | None, request: RenderRequest, composed: Plan, geometry: Geometry, coarse: bool,
+               deadline: float | None) -> Render:
         """A new picture, from what is left of the one before."""
-        before, pace, memory, goes_on = self._render, self._pace, Memory() if self._keep else None, False
+        pace, memory, goes_on = self._pace, Memory() if self._keep else None, False
         what = Change(frozenset(), ())
         if self._keep and before is not None:
             what = change(before.request, request, before.tracer.geometry.leaves, geometry.leaves)
-            goes_on = what.extent("light") == KEPT and before.can_go_on(request, composed)
+            goes_on = what.extent("light") == KEPT and before.can_go_on(request, composed, coarse)
             if what.extent("hits") != ANEW:
                 memory = self._remember(before, what, geometry, request.scene)
             if "nodes" in what.edits:
@@ -144,7 +161,7 @@ class Renderer:
         memory, old = before.memory, before.tracer.geometry
         if what.extent("hits") == TOUCHED:
             came = [geometry.leaves[index] for index in what.leaves if geometry.leaves[index].visible]
-            boxes = [leaf_bounds(leaf) for leaf in came]
+            boxes = [packed_bounds(packed(leaf, geometry.dtype)) for leaf in came]
             if None in boxes:       # it has no end, or no extent
                 return Memory()
             corners = np.array(boxes, np.float64).reshape(-1, 2, 3)

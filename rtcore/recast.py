@@ -108,7 +108,9 @@ class Recast:
             return values.reshape(self._height, self._width, *values.shape[1:]).copy()
         source = np.empty(self._height * self._width, np.int32)
         sources(film, self._width, self._height, spacing, source)
-        return values[source].reshape(self._height, self._width, *values.shape[1:])
+        shown = values[source]
+        shown[film.count[source] == 0] = 0
+        return shown.reshape(self._height, self._width, *values.shape[1:])
 
     def tests(self, film: Film, share: Callable = map) -> np.ndarray:
         """Boxes and primitives that each pixel's first ray must be tested against, int32 (h·w); 0 where there is no sample yet. share:

@@ -129,7 +129,7 @@ class First(NamedTuple):
 
 
 class Tracer:
-    """Traces tiles of one scene from one camera. Holds nothing that changes, so threads may share it."""
+    """Traces tiles of one scene from one camera. Holds nothing that changes but the kernels it has met, so threads may share it."""
 
     def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, lens: np.ndarray | None, up,
                  background: Background, fog: Fog | None):
@@ -219,6 +219,7 @@ class Tracer:
             film.lit[scratch.target[:n]] = 0
         if recall is None or not recall.noted:
             self.run(films.note_first_hits, film, wave, n, scratch.target)
+            film.doubt[scratch.target[:n]] = 0
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
@@ -257,6 +258,7 @@ class Tracer:
     def hit(self, clock: Clock, wave: Wave, n: int, counts: np.ndarray, first: First | None) -> None:
         """Nearest hits and their surfaces. Rays of which they are known are not traced, nor counted."""
         recall, known, spared = first and first.recall, 0, ("primary rays", "core")     # looking up counts to what it spares
+        wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
         if recall is not None:
             primary = not recall.levels
             known, hits, reflected, refracted = recall.hits(wave, n)

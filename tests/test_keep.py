@@ -7,7 +7,7 @@ import rtcore
 from rtcore import (Ambient, Background, Box, Camera, Checker, Cylinder, Directional, Fog, Material, Mesh, Node, Plane, Point, Scale, Scene,
                     Sphere, Translate, edits)
 from rtcore.flatten import flatten, renumbering
-from rtcore.keep import UNKNOWN
+from rtcore.keep import BOXES, UNKNOWN
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.settings import Settings
 
@@ -162,6 +162,58 @@ def test_more_samples_go_on_from_those_there_are():
     assert more.pixels.tobytes() == whole.pixels.tobytes() and more.rays == whole.stats["rays"] and first.done
     fewer = picture(renderer, SCENE, SCENE.camera, settings)
     assert fewer.pixels.tobytes() == first.pixels.tobytes()
+    renderer.close()
+
+
+@pytest.mark.parametrize("before, after", [((16, True), (64, False)), ((8, False), (4, True)), ((8, True), (4, True)),
+                                           ((16, True), (16, False))])
+def test_samples_are_taken_over_only_where_the_picture_is_the_same(before, after):
+    renderer, size = Renderer(keep=True), {"size": SIZE, "threads": 2}
+    for samples, adaptive in (before, after):
+        settings = Settings(samples=samples, adaptive=adaptive, **size)
+        seen = picture(renderer, SCENE, SCENE.camera, settings)
+    assert same(seen, anew(SCENE, SCENE.camera, settings))
+    renderer.close()
+
+
+def test_a_name_is_no_reason_to_begin_anew():
+    renderer, settings = Renderer(keep=True), Settings(size=SIZE, samples=8)
+    first = picture(renderer, SCENE, SCENE.camera, settings)
+    named = replace(node(light(SCENE, 0, name="lamp", note="old"), "mirror", note="shiny"), name="a scene")
+    again = picture(renderer, named, SCENE.camera, settings)
+    assert same(first, again) and again.rays == first.rays
+    renderer.close()
+
+
+def test_an_iterator_that_somebody_still_holds_is_ended_by_the_next_picture():
+    renderer, settings = Renderer(keep=True), Settings(size=(400, 300), samples=256, threads=2)
+    held = renderer.frames(RenderRequest(SCENE, SCENE.camera, settings), coarse=False)
+    assert not next(held).done
+    one = replace(settings, samples=1)
+    assert same(picture(renderer, SCENE, SCENE.camera, one), anew(SCENE, SCENE.camera, one))
+    assert list(held) == []
+    renderer.close()
+
+
+def test_nothing_of_the_picture_before_shows_through():
+    renderer, settings, calls = Renderer(keep=True), Settings(size=(400, 300), samples=1), []
+    picture(renderer, SCENE, SCENE.camera, settings)
+    empty = Scene(objects=[NODES[1]], camera=Camera(lookfrom=(0, 50, -6), lookat=(0, 60, 0)), lights=[])
+    list(renderer.frames(RenderRequest(empty, empty.camera, settings), lambda: calls.append(0) or len(calls) > 1, deadline=0.1))
+    frame = renderer._render.frame(False)
+    assert (frame.node == -1).all() and (frame.distance == np.inf).all()
+    renderer.close()
+
+
+def test_what_came_is_remembered_only_so_long():
+    renderer, settings = Renderer(keep=True), Settings(size=(32, 24), samples=1)
+    picture(renderer, SCENE, SCENE.camera, settings)
+    for k in range(80):
+        moved = node(SCENE, "mirror", transform=(Translate((0.001 * k, 0, 0)),))
+        picture(renderer, moved, SCENE.camera, replace(settings, shadows=False))
+    levels = [level for levels in renderer._render.memory.tiles.values() for level in levels]
+    assert levels and max((len(shade.boxes) for level in levels for shade in level.shades.values()), default=0) <= BOXES
+    assert same(picture(renderer, moved, SCENE.camera, settings), anew(moved, SCENE.camera, settings))
     renderer.close()
 
 

@@ -128,7 +128,7 @@ def edits_of(scene: Scene, settings: Settings) -> dict[str, Callable[[int], tupl
         result["light"] = lambda k: (replace(scene, lights=(*lights[:-1], replace(lights[-1], intensity=0.1 * (k + 1)))), settings)
     at = next((i for i, light in enumerate(lights) if type(light) in SHINE), None)
     if at is not None:
-        field = next(name for name in ("position", "center", "corner", "direction") if hasattr(lights[at], name))
+        field = next(name for name in ("position", "direction") if hasattr(lights[at], name))
         place = np.array(getattr(lights[at], field))
 
         def move(k: int) -> tuple[Scene, Settings]:
