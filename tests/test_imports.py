@@ -21,7 +21,7 @@ LAYERS = (
     {"rtcore.across", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.jit", "rtcore.lanes", "rtcore.neighbours",
      "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},
     # shapes walk the tree in their kernels, so it comes before them
-    {"rtcore.bvh", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
+    {"rtcore.bvh", "rtcore.pyramid", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
     {"rtcore.settings", "rtcore.bounds", "rtcore.framing", "rtcore.eye", "rtcore.lens", "rtcore.shading", "rtcore.fog", "rtcore.film",
      "rtcore.schedule", "rtcore.adaptive", "rtcore.keep", "rtcore.pace", "rtcore.gloss", "rtcore.filters"},
