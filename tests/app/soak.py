@@ -6,6 +6,7 @@ Prints how long the window's thread did not answer, and what threads, memory and
 """
 import argparse
 import contextlib
+import ctypes
 import gc
 import os
 import random
@@ -40,8 +41,8 @@ from rtcore.scene import Material, Translate  # noqa: E402
 from rtcore.settings import VIEW_NAMES  # noqa: E402
 
 LEFT, NO_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier
-SIZE = 1280, 800
-GROWTH = 100        # MiB that the memory of the process may have more after it: the allocator keeps pieces of pictures
+SIZE, SMALLEST, LARGEST = (1280, 800), (900, 650), (1600, 1000)
+GROWTH = 128        # MiB of memory that the process may hold more after it: less than one largest picture and what is kept of it
 
 
 class Soak(QObject):
@@ -222,7 +223,7 @@ class Soak(QObject):
     # the window
 
     def resize(self) -> Iterator[float]:
-        wide, high = self.random.randrange(900, 1600), self.random.randrange(650, 1000)
+        wide, high = (self.random.randrange(*ends) for ends in zip(SMALLEST, LARGEST))
         for share in np.linspace(0, 1, 12):
             self.window.resize(*(round(a + (b - a) * share) for a, b in zip(SIZE, (wide, high))))
             yield 16
@@ -275,6 +276,7 @@ class Held:
 
     def __init__(self):
         gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)        # what is free goes back to the system: pictures of other sizes leave holes
         self.threads = sorted(thread.name for thread in threading.enumerate())
         with open("/proc/self/statm", encoding="ascii") as file:
             self.memory = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / (1 << 20)
@@ -305,7 +307,15 @@ def warm_up(window: Window, scenes: list[Path]):
     for name in (*VIEW_NAMES, "beauty"):
         session.set_options(msgspec.structs.replace(session.options, view=name))
         settled()
-    assert finished(window, scenes[0])
+    for dock in window.docks.values():
+        shown = dock.isVisible()
+        dock.setVisible(True)
+        dock.raise_()
+        wait(lambda: False, 0.7)        # some load what they draw with
+        dock.setVisible(shown)
+    for size in (LARGEST, SIZE):
+        window.resize(*size)
+        assert finished(window, scenes[0])
 
 
 def soak(seconds: float, seed: int, scenes: list[Path], folder: Path) -> tuple[Heart, Soak, Held, Held]:
