@@ -27,6 +27,7 @@ from rtcore.shapes import Sphere  # noqa: E402
 
 ANSWER, MOTION = 100, 33.4      # ms
 LOOK = 0.001                    # s between two looks at the screen
+COPIED = 0.005                  # s that the server may take to copy a picture
 NEAR = 12                       # pixels by which the marker's middle may be off: the first lattice is coarse
 STEP, RATE = 8, 60              # pixels a step of the drag, steps a second
 JUMP = 60                       # pixels of a move from rest
@@ -67,10 +68,10 @@ class Watch:
             time.sleep(LOOK)
 
     def views(self, since: float, until: float) -> list[float]:
-        """When another view came, and not only a finer picture of the same."""
+        """When another view came: not only a finer picture of the same, nor one that the server had copied in part."""
         times, last = [], NONE
-        for when, x in self.seen:
-            if not abs(x - last) < STEP:
+        for (when, x), (after, _) in zip(self.seen, [*self.seen[1:], (np.inf, NONE)]):
+            if after - when > COPIED and not abs(x - last) < STEP:
                 last = x
                 times += [when] if since <= when <= until else []
         return times
