@@ -6,6 +6,7 @@ their variances, however well each is stratified. It can't tell what no sample h
 lies beyond the depth of reflections, or the rounding of float32.
 """
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -236,6 +237,7 @@ def _curve() -> np.ndarray:
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055) * 255 + 0.5
 
 
+BANDS = 4       # of rows, for threads to share
 CURVE = _curve().astype(np.float32)
 
 
@@ -253,8 +255,10 @@ def _encode(pixels, out, exposure, curve):
             out[y, x, 3] = 255
 
 
-def encode(pixels: np.ndarray, out: np.ndarray | None = None, exposure: float = 1.0) -> np.ndarray:
-    """Linear (h, w, 3) float32 as sRGB bytes (h, w, 4): blue, green, red, 255, the order of Qt's Format_RGB32."""
+def encode(pixels: np.ndarray, out: np.ndarray | None = None, exposure: float = 1.0, share: Callable = map) -> np.ndarray:
+    """Linear (h, w, 3) float32 as sRGB bytes (h, w, 4): blue, green, red, 255, the order of Qt's Format_RGB32. share: a `map` that may work
+    on several threads."""
     out = np.empty((*pixels.shape[:2], 4), np.uint8) if out is None else out
-    _encode(pixels, out, np.float32(exposure), CURVE)
+    rows = [len(pixels) * k // BANDS for k in range(BANDS + 1)]
+    list(share(lambda a, b: _encode(pixels[a:b], out[a:b], np.float32(exposure), CURVE), rows[:-1], rows[1:]))
     return out

@@ -30,7 +30,7 @@ def test_every_edit_is_what_its_name_says():
             loop.show(scene, loop.camera, chosen)
             if (scene, chosen) != (SCENE, settings) and kind != "exposure":
                 assert kind in loop.renderer.edits, (kind, k, loop.renderer.edits)
-    loop.renderer.close()
+    loop.close()
 
 
 def test_a_scene_without_lights_or_shapes_has_no_use_for_some_edits():

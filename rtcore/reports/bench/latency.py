@@ -7,6 +7,7 @@ the bytes for the screen. The first of each is not counted: kernels are loaded t
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,13 +61,22 @@ class Loop:
         self.settings = Settings(size=size, samples=16, adaptive=True)
         self.random = np.random.default_rng(0)
         self._bytes = np.empty((size[1], size[0], 4), np.uint8)
+        self._encoders = ThreadPoolExecutor(2)
+
+    def close(self) -> None:
+        """End all threads."""
+        self.renderer.close()
+        self._encoders.shutdown()
+
+    def _encode(self, pixels: np.ndarray) -> None:
+        films.encode(pixels, self._bytes, share=self._encoders.map)
 
     def show(self, scene: Scene, camera, settings: Settings, deadline: float = ANSWER, whole: bool = True) -> tuple[float, int]:
         """Seconds until the first picture, or with `whole` the first of every pixel, is ready for the screen, and the eye's rays traced."""
         enough, start, before = threading.Event(), time.perf_counter(), self._primary()
         taken, rays = 0.0, 0
         for frame in self.renderer.frames(RenderRequest(scene, camera, settings), enough.is_set, deadline=deadline):
-            films.encode(frame.pixels, self._bytes)
+            self._encode(frame.pixels)
             if not whole or frame.samples:
                 taken, rays = time.perf_counter() - start, frame.rays["primary"]
                 enough.set()
@@ -90,7 +100,7 @@ class Loop:
         timer.start()
         for frame in self.renderer.frames(RenderRequest(self.scene, self.moved(), replace(self.settings, samples=4096)), gone.is_set,
                                           deadline=ANSWER):
-            films.encode(frame.pixels, self._bytes)
+            self._encode(frame.pixels)
         timer.join()
         return time.perf_counter() - moment[0]
 
@@ -164,7 +174,7 @@ def measure(name: str, scene: Scene, size: tuple[int, int] = SIZE, rounds: int =
         edits["camera"] = spread(taken for taken, _ in camera), max(rays for _, rays in camera)
         return Told(name, spread(first), spread(drag), spread(stale), edits)
     finally:
-        loop.renderer.close()
+        loop.close()
 
 
 def _placed(loop: Loop, edited: tuple[Scene, Settings]) -> tuple:
