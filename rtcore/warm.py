@@ -40,7 +40,6 @@ def _core(dtype):
     films.commit(film, sample, n, target)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, np.zeros(0, np.int32), 8, 0, 8, 1, pixels, node, distance)
-    films.sources(film, 8, 8, 1, np.empty(64, np.int32))
 
 
 def _lens(dtype):
@@ -83,7 +82,9 @@ def _adaptive(dtype):
 
 
 def _recast(dtype):
-    film, pixels = films.new_film(8, 8), np.zeros(0, np.int32)
+    film, pixels = films.new_film(8, 8, lit=True), np.zeros(0, np.int32)
+    films.sources(film, 8, 8, 1, np.empty(64, np.int32))
+    films.note_lit(film, new_beam(8, 1, dtype), 0, pixels, np.float32(1))
     recast.cast_again(new_rays(8, dtype), 0, Camera().rays(8, 8), 8, pixels, film)
     recast.note_places(new_rays(8, dtype), np.empty((SURFACE_ROWS, 8), dtype), 0, pixels, 0, 0, False, np.empty((0, 3), np.float32))
     recast.count_tests(bvh.EMPTY_TREE, 0, Camera().rays(8, 8), 8, pixels, film.distance, pixels)
@@ -106,14 +107,13 @@ def _rows(dtype):
 
 def _lit(dtype):
     wave, _, n = _wave(dtype)
-    beam = new_beam(n, 1, dtype)
-    shading.gather(wave, beam, 0)
-    films.note_lit(films.new_film(8, 8, lit=True), beam, 0, np.empty(0, np.int32), np.float32(1))
+    shading.gather(wave, new_beam(n, 1, dtype), 0)
 
 
 def _keep(dtype):
     wave, _, n = _wave(dtype)
     beam, recall, boxes = new_beam(n, 1, dtype), Recall([]), np.zeros((1, 6))
+    films.note_lit(films.new_film(8, 8, lit=True), beam, 0, np.zeros(0, np.int32), np.float32(1))
     recall.hits(wave, n)
     recall.note_hits(wave, n)
     recall.note_shadows(beam, (), 0, 0)

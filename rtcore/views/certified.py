@@ -13,4 +13,5 @@ def draw(seen):
     return shown
 
 
-CERTIFIED = View("certified", "which hits on formulas are certified; orange ones are not", draw, needs_light=True)
+CERTIFIED = View("certified", "which hits on formulas are certified; orange ones are not", draw, needs_light=True,
+                 kernels=("recast",))

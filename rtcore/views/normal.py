@@ -10,4 +10,4 @@ def draw(seen):
     return shown.astype(np.float32)
 
 
-NORMAL = View("normal", "the surface's normal, x y z as red green blue", draw)
+NORMAL = View("normal", "the surface's normal, x y z as red green blue", draw, kernels=("recast",))
