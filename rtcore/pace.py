@@ -4,7 +4,7 @@ import math
 from rtcore.schedule import COARSEST, LATTICES, TILE
 
 EDGES = (2 * TILE, TILE, TILE // 2, TILE // 4)
-LONG = 0.006        # seconds that a tile may take: then its thread sees that it is not wanted any more
+LONG = 0.012        # seconds that a tile may take: then its thread sees that it is not wanted any more
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
 
 
