@@ -75,7 +75,8 @@ def test_a_scene_of_spheres_needs_the_kernels_of_spheres():
     made = scene(*(Sphere((i, 0, 0), 0.4) for i in range(9)))
     assert plan(made, Settings(samples=1)).kernels == (
         "core.f64", "glow.f64", "leaf.f64", "tree.f64", "sphere.f64", "light-point.f64", "lit.f64")
-    assert plan(made, Settings(view="normal", precision="f32")).kernels == ("core.f32", "leaf.f32", "tree.f32", "sphere.f32")
+    assert plan(made, Settings(view="depth", precision="f32")).kernels == ("core.f32", "leaf.f32", "tree.f32", "sphere.f32")
+    assert plan(made, Settings(view="normal", precision="f32")).kernels == ("core.f32", "leaf.f32", "tree.f32", "sphere.f32", "recast.f32")
     assert plan(scene(Sphere((0, 0, 0), 1), lights=[]), Settings()).kernels == (
         "core.f64", "glow.f64", "samples.f64", "leaf.f64", "sphere.f64")
     squashed = Node(shape=Sphere((0, 0, 0), 1), transform=[Scale((1, 2, 1))])
