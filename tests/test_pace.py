@@ -59,8 +59,7 @@ def test_every_pixel_is_in_one_tile_of_one_lattice(first):
 
 
 def test_the_first_picture_comes_in_time_and_shows_all_of_the_view():
-    scene, camera = Scene(objects=[Sphere((0, 0, 0), 1)]), Camera(lookfrom=(0, 0, -5))
-    renderer, late, shown = Renderer(keep=True), [], []
+    scene, renderer, late, shown = Scene(objects=[Sphere((0, 0, 0), 1)]), Renderer(keep=True), [], []
     for turn in range(12):
         start = time.perf_counter()
         view = Camera(lookfrom=(0.1 * turn, 0, -5))
@@ -69,5 +68,5 @@ def test_the_first_picture_comes_in_time_and_shows_all_of_the_view():
             shown.append((frame.node >= 0).mean())
             break
     renderer.close()
-    assert min(late[2:]) < 0.1 and camera.lookfrom == (0, 0, -5)        # a busy machine may be late now and then
+    assert min(late[2:]) < 0.1      # a busy machine may be late now and then
     assert all(abs(share - shown[-1]) < 0.05 for share in shown) and shown[-1] > 0.1

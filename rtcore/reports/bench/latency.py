@@ -24,7 +24,7 @@ from rtcore.scene import Background, Fog, Node, Scene
 from rtcore.settings import Settings
 
 SIZE = (1280, 720)
-ANSWER, MOTION = 0.1, 1 / 30        # seconds: what the window asks of the first picture of a change, and of a step of a drag
+ANSWER, MOTION = 0.1, 1 / 30        # seconds to the first picture of a change, and to that of a step of a drag
 KINDS = ("fog", "shadows", "reflections", "light", "move_light", "material", "background", "exposure", "view", "hide", "camera")
 
 replace = msgspec.structs.replace
