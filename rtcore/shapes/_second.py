@@ -4,8 +4,8 @@ The form is Ax² + By² + Cz² + Dxy + Exz + Fyz + Gx + Hy + Iz + J, its numbers
 leads to; a box there, a slab, or the whole space says which of its points belong to the surface. Along a ray about its closest approach
 to the unit space's origin it is a s² + 2 b s + c.
 
-Columns of Table.exact: those of `_unit.py`; three parts each of the ten numbers; two parts of the box's corners, or three of
-the slab's vector e, at BOX, BOX + 6 and BOX + 9: it is what has |e·p| <= 1/2.
+Columns of Table.exact: those of `_unit.py`; three parts each of the ten numbers; at BOX two parts of the box's corners, or at SLAB, NEXT
+and LAST three of the slab's vector e: it is what has |e·p| <= 1/2.
 """
 from typing import NamedTuple
 
@@ -16,11 +16,12 @@ from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import along, any_lane, dot, fma, load, load3, root, rounded, select, size, splat3, vec3, wide, with_sign
 from rtcore.pairs import add, multiply
 from rtcore.shapes._ball import U64, advance, after_start, certain, extent
-from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_pairs, noise_here
+from rtcore.shapes._unit import BEYOND, PLACE, into_plain, line_expanded, line_in_unit, noise_here
 from rtcore.shapes.kind import BACK, FRONT
 from rtcore.wave import DX, OX, SLOW, START, T, record_one, until
 
 FORM, BOX = BEYOND, BEYOND + 30
+LAST, NEXT, SLAB = range(BOX, BOX + 9, 3)
 EVERYWHERE, IN_BOX, IN_SLAB = 0, 1, 2
 GONE = 2.0 ** 14    # how far a bound must be surpassed for plain arithmetic to be a good start
 
@@ -71,9 +72,15 @@ def approach(ray, i, exact, q, most, curved):
     c = 0.5 * dot(mn, n) + dot(slope, n) + exact[q, FORM + 9]
     far, speed, reach = most * (extent(g) + extent(v) * size(shift)), most * extent(v), extent(n)
     blur, blur_b, blur_c = 32 * U64 * curved * speed * speed, 32 * U64 * speed * (far + 1), 64 * U64 * (far + 1) * (reach + 1)
+    return judged(shift, a, b, c, blur, blur_b, blur_c, n, d, far, speed, reach)
+
+
+@inline
+def judged(shift, a, b, c, blur, blur_b, blur_c, foot, way, far, speed, reach):
+    """All that with the discriminant and what it may be off."""
     off = difference(b, b, a, c)
     fuzz = 2 * size(b) * blur_b + size(a) * blur_c + size(c) * blur + blur * blur_c + blur_b * blur_b + 4 * U64 * size(off)
-    return Near(shift, a, b, c, blur, blur_b, blur_c, off, fuzz, n, d, far, speed, reach)
+    return Near(shift, a, b, c, blur, blur_b, blur_c, off, fuzz, foot, way, far, speed, reach)
 
 
 @inline
@@ -160,44 +167,61 @@ def within(p, low, high, margin):
 def placed(near, s, margin, low, high, part, limit):
     """Lanes whose point at s from the closest approach, plainly and off by `margin`, surely belongs to the part of the form that counts,
     and those whose point may."""
-    p, margin = along(near.foot, s, near.way), near.speed * margin + 64 * U64 * (near.far + limit + near.reach)
-    return between(p, low, margin) if part == IN_SLAB else within(p, low, high, margin)
+    margin = near.speed * margin + 64 * U64 * (near.far + limit + near.reach)
+    if part == IN_SLAB:
+        height, margin = size(fma(s, dot(near.way, low), dot(near.foot, low))), margin * extent(low)
+        return height <= 0.5 - margin, height <= 0.5 + margin
+    return within(along(near.foot, s, near.way), low, high, margin)
 
 
 @inline
-def meet(ray, i, exact, q, most, part, limit, todo, near, side, where):
+def meet(ray, i, exact, q, most, even, part, limit, todo, near, side, where):
     """Where the lanes `todo` first meet surface q: t in the rays' precision, the lanes that do, those for which that is not certain. part:
-    which part of the form belongs to it; none of it is further than `limit` from the origin. where: see `_ball.choose`."""
+    which part of the form belongs to it; none of it is further than `limit` from the origin. even: see `line_in_unit`. where: see
+    `_ball.choose`."""
     start, end, like = wide(load(ray, START, i)), until(ray, i), load(ray, T, i)
-    low, high = splat3(exact, q, BOX), splat3(exact, q, BOX + 3)    # the box's corners, or the slab's vector and nothing
+    low, high = splat3(exact, q, SLAB if part == IN_SLAB else BOX), splat3(exact, q, BOX + 3)   # the slab's vector, or the box's corners
     half = root(near.off)
-    w = -(near.b + with_sign(half, near.b))
-    s0, s1 = w / near.a, near.c / w
+    w = -(near.b + with_sign(half, near.b))     # the roots are w / a and c / w
     lead = size(near.a) + near.blur
-    gone = lead <= 0        # the root w/a is nowhere as a is 0, or lies beyond the limit
+    gone = lead <= 0        # the root w / a is nowhere as a is 0, or lies beyond the limit
     if part != EVERYWHERE:
-        gone = gone | (lead * (near.reach + limit) < size(w) * root(dot(near.way, near.way)))
+        gone = gone | (lead * (near.reach + limit) < 0.57 * size(w) * extent(near.way))
     sure = (near.off > GONE * near.fuzz) & (gone | (size(near.a) > GONE * near.blur))
     unsure = todo & ~sure
     todo = todo & sure
-    # twice what the errors of a, b, c leave of the roots
-    blur_w = near.blur_b + near.fuzz / half
-    slack0 = 2 * (blur_w + size(s0) * near.blur) / size(near.a) + 8 * U64 * (size(s0) + size(near.shift))
-    slack1 = 2 * (near.blur_c + size(s1) * blur_w) / size(w) + 8 * U64 * (size(s1) + size(near.shift))
-    swap = ~gone & (s0 < s1)
-    first, last = select(swap, s0, s1), select(gone, np.inf, select(swap, s1, s0))
-    slack, slack_last = select(swap, slack0, slack1), select(gone, 0, select(swap, slack1, slack0))
+    blur_w = near.blur_b + half / GONE      # fuzz / half is less
+    if side & (FRONT | BACK):
+        # only one of the roots is on the visible side: the form falls at c / w where w > 0, and rises at w / a
+        other = w < 0 if side & FRONT else w > 0
+        todo = todo & ~(other & gone)
+        down = 1 / select(other, near.a, w)
+        first = select(other, w, near.c) * down
+        slack = slack_of(select(other, blur_w, near.blur_c), select(other, near.blur, blur_w), first, down, near.shift)
+        last, slack_last = first, slack
+    else:
+        down_a, down_w = 1 / near.a, 1 / w
+        s0, s1 = w * down_a, near.c * down_w
+        slack0 = slack_of(blur_w, near.blur, s0, down_a, near.shift)
+        slack1 = slack_of(near.blur_c, blur_w, s1, down_w, near.shift)
+        swap = ~gone & (s0 < s1)
+        first, last = select(swap, s0, s1), select(gone, np.inf, select(swap, s1, s0))
+        slack, slack_last = select(swap, slack0, slack1), select(gone, 0, select(swap, slack1, slack0))
     guess, guess_last = first + near.shift, last + near.shift
     want = todo & (guess + slack > start) & (guess - slack < end)
-    want_last = todo & (guess_last + slack_last > start) & (guess_last - slack_last < end)
-    inside, inside_last = want, want_last
+    inside = want
     if part != EVERYWHERE:
         inside, maybe = placed(near, first, slack, low, high, part, limit)
-        inside_last, maybe_last = placed(near, last, slack_last, low, high, part, limit)
-        want, want_last = want & maybe, want_last & maybe_last
-    t = guess
-    found = todo & ~todo
-    if not where and side & (FRONT | BACK) == 0:
+        want = want & maybe
+    t, found = guess, todo & ~todo
+    want_last, inside_last = found, found
+    if side & (FRONT | BACK) == 0:
+        want_last = todo & (guess_last + slack_last > start) & (guess_last - slack_last < end)
+        inside_last = want_last
+        if part != EVERYWHERE:
+            inside_last, maybe = placed(near, last, slack_last, low, high, part, limit)
+            want_last = want_last & maybe
+    if not where:
         found = want & inside & (guess - slack > start) & (guess + slack < end)
         hit = want_last & inside_last & (guess_last - slack_last > start) & (guess_last + slack_last < end)
         t = select(found, guess, guess_last)
@@ -205,7 +229,7 @@ def meet(ray, i, exact, q, most, part, limit, todo, near, side, where):
         want, want_last = want & ~found, want_last & ~found
     if any_lane(want | want_last):
         m = form_of(exact, q, 0 * w)
-        f, f1, v, v1 = line_in_pairs(ray, i, exact, q)
+        f, f1, v, v1 = line_in_unit(ray, i, exact, q, even)
         far = near.far + most * extent(splat3(exact, q, PLACE))
         for k in range(2):
             if k == 1:
@@ -223,15 +247,17 @@ def meet(ray, i, exact, q, most, part, limit, todo, near, side, where):
                         inside, maybe = between(p, low, margin)
                     ok = ok & (inside | ~maybe)
                     hit = hit & inside
-                if side & FRONT:
-                    hit = hit & (slope < 0)
-                elif side & BACK:
-                    hit = hit & (slope > 0)
                 unsure = unsure | (want & ~ok)
                 hit = hit & ok
                 t = select(hit, r, t)
                 found = found | hit
     return rounded(t, like), found, unsure
+
+
+@inline
+def slack_of(blur, blur_down, s, down, shift):
+    """Twice what a root s, the quotient of numbers off by `blur` and `blur_down`, and its t may be off; down: 1 over the latter."""
+    return 2 * (blur + size(s) * blur_down) * size(down) + 8 * U64 * (size(s) + size(shift))
 
 
 # --- the slow way ---
@@ -341,7 +367,7 @@ def heights(exact, q, v, out):
     out_of_line()
     terms, n = np.empty(18 * LONG + LONG), 0
     for k in range(3):
-        n = put_products(terms, n, 1.0, (exact[q, BOX + k], exact[q, BOX + 6 + k], exact[q, BOX + 9 + k]), v[k])
+        n = put_products(terms, n, 1.0, (exact[q, SLAB + k], exact[q, NEXT + k], exact[q, LAST + k]), v[k])
     expand(terms, n, out)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from rtcore.expansions import EXACT_NOISE, LONG, NOISE, expand, put_products
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import load3, splat3, vec3, wide
-from rtcore.pairs import add, multiply, two_sum
+from rtcore.pairs import add, multiply, ordered_sum, two_sum
 from rtcore.wave import DX, OX
 
 PLACE, INTO, BEYOND = 0, 9, 36      # columns: parts of c, parts of L; a kind's own numbers follow
@@ -52,6 +52,23 @@ def line_in_pairs(ray, i, exact, q):
     f, f1 = into_pairs(exact, q, vec3(x, y, z), vec3(x1, y1, z1) - splat3(exact, q, PLACE + 3))
     v, v1 = into_pairs(exact, q, d, vec3(zero, zero, zero))
     return f, f1, v, v1
+
+
+@inline
+def line_in_unit(ray, i, exact, q, even):
+    """As `line_in_pairs`, the same bits in a tenth of the time where L is `even` times the identity and `even` a power of two; else it
+    is 0."""
+    if even == 0:
+        return line_in_pairs(ray, i, exact, q)
+    f, v, c, rest = wide(load3(ray, OX, i)), wide(load3(ray, DX, i)), splat3(exact, q, PLACE), splat3(exact, q, PLACE + 3)
+    x, x1 = two_sum(f.x, -c.x)
+    y, y1 = two_sum(f.y, -c.y)
+    z, z1 = two_sum(f.z, -c.z)
+    x, x1 = ordered_sum(x, x1 - rest.x)
+    y, y1 = ordered_sum(y, y1 - rest.y)
+    z, z1 = ordered_sum(z, z1 - rest.z)
+    zero = 0 * x
+    return vec3(x, y, z) * even, vec3(x1, y1, z1) * even, v * even, vec3(zero, zero, zero)
 
 
 @inline

@@ -92,7 +92,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         near = approach(rays.ray, i, table.exact, q, most, curved)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
-                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, IN_BOX, 2.0, todo, near, table.side[q], where)
+                            t, found, unsure = meet(rays.ray, i, table.exact, q, most, 0.0, IN_BOX, 2.0, todo, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
@@ -111,7 +111,7 @@ def intersect_open(rays, n, tree, table, first, opacity):
             near = approach(rays.ray, i, table.exact, q, most, curved)
             todo = may_meet(near) & alive(rays.ray, i)
             if any_lane(todo):
-                t, found, unsure = meet(rays.ray, i, table.exact, q, most, EVERYWHERE, 2.0, todo, near, table.side[q], where)
+                t, found, unsure = meet(rays.ray, i, table.exact, q, most, 0.0, EVERYWHERE, 2.0, todo, near, table.side[q], where)
                 record(rays, i, first + q, t, found, opacity)
                 late = bits(unsure)
                 while late:
