@@ -41,7 +41,7 @@ def _aim(wave, n, places, view):
     fill(wave.rays.depth, n, 0)
     for k in range(3):
         store(wave.weight, k, n, splat(np.float32(1)))
-    count_up(wave.owner, n, n)
+    count_up(wave.owner, n, n, 1)
 
 
 @kernel

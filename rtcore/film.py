@@ -13,7 +13,7 @@ import numpy as np
 
 from rtcore.across import count
 from rtcore.jit import inline, kernel
-from rtcore.lanes import LANES, exceeds, load, load3, narrow, select, store, wide
+from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, store, wide
 from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, store1, store_triples, turns
 from rtcore.sampling import REPLICATES
 from rtcore.wave import DEPTH_UNIT, NX, T
@@ -23,6 +23,7 @@ class Film(NamedTuple):
     """One picture of h·w pixels, rows from the top. What tells of the error has length 0 in a film of one sample per pixel."""
 
     total: np.ndarray       # float64 (h·w, 3): sum of the samples
+    # told from the second sample on:
     split: np.ndarray       # float32 (h·w, 3): sum of the first replicate's samples less that of the second's
     square: np.ndarray      # float64 (h·w): sum of the samples' squares, the mean over the channels
     count: np.ndarray       # int32 (h·w): how many
@@ -134,28 +135,32 @@ def commit(film, sample, n, target):
 
 @inline
 def _commit_eight(film, p, r, g, b):
-    """A finished sample of each of pixels p .. p+7; returns how many were not finite."""
+    """A finished sample of each of pixels p .. p+7, traced together, so as many as each other has; returns how many were not finite."""
     total = r + g + b
     finite = total - total == 0
     r, g, b = select(finite, r, 0), select(finite, g, 0), select(finite, b, 0)
-    if film.count[p] == 0:      # so it is for all eight: they were traced together
-        for q in range(p, p + LANES):
-            begin(film, q)
-    add_triples(film.total, p, r, g, b)
+    if film.count[p] == 0:
+        store_triples(film.total, p, r, g, b)
+        fill(film.count, p, 1)
+        return LANES - count(finite)
     if film.square.shape[0] > 0:
+        if film.count[p] == 1:
+            for q in range(p, p + LANES):
+                take_first(film, q)
         side = turns(film.count, p)
         add_triples(film.split, p, side * narrow(r), side * narrow(g), side * narrow(b))
         store1(film.square, p, load1(film.square, p) + (r * r + g * g + b * b) / 3)
+    add_triples(film.total, p, r, g, b)
     add_one(film.count, p)
     return LANES - count(finite)
 
 
 @inline
-def begin(film, p):
-    """Pixel p has no sample yet."""
-    film.total[p, 0] = film.total[p, 1] = film.total[p, 2] = 0
-    if film.square.shape[0] > 0:
-        film.split[p, 0] = film.split[p, 1] = film.split[p, 2] = film.square[p] = 0
+def take_first(film, p):
+    """Pixel p gets its second sample: now the first one's error begins to matter. A first picture is there sooner for not telling it."""
+    r, g, b = film.total[p, 0], film.total[p, 1], film.total[p, 2]
+    film.split[p, 0], film.split[p, 1], film.split[p, 2] = r, g, b
+    film.square[p] = (r * r + g * g + b * b) / 3
 
 
 @inline
@@ -164,18 +169,22 @@ def _commit_one(film, p, r, g, b):
     bad = not np.isfinite(r + g + b)
     if bad:
         r = g = b = 0.0
-    if film.count[p] == 0:
-        begin(film, p)
-    film.total[p, 0] += r
-    film.total[p, 1] += g
-    film.total[p, 2] += b
+    number = film.count[p]      # samples come in order, so the count is the sample's number
+    film.count[p] = number + 1
+    if number == 0:
+        film.total[p, 0], film.total[p, 1], film.total[p, 2] = r, g, b
+        return bad
     if film.square.shape[0] > 0:
-        side = np.float32(1 - 2 * (film.count[p] % REPLICATES))     # samples come in order, so the count is the sample's number
+        if number == 1:
+            take_first(film, p)
+        side = np.float32(1 - 2 * (number % REPLICATES))
         film.split[p, 0] += side * np.float32(r)
         film.split[p, 1] += side * np.float32(g)
         film.split[p, 2] += side * np.float32(b)
         film.square[p] += (r * r + g * g + b * b) / 3
-    film.count[p] += 1
+    film.total[p, 0] += r
+    film.total[p, 1] += g
+    film.total[p, 2] += b
     return bad
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.film import Film, begin
+from rtcore.film import Film
 from rtcore.jit import inline, kernel
 from rtcore.sampling import REPLICATES, jitter
 from rtcore.shapes.kind import normalized
@@ -91,7 +91,9 @@ def commit(film, sample, n, target, signs):
         p, w = target[i], np.float64(signs[i])
         side = 1 - 2 * (film.count[p] % REPLICATES)
         if film.count[p] == 0:
-            begin(film, p)
+            film.square[p] = 0
+            for k in range(3):
+                film.total[p, k] = film.split[p, k] = 0
             for k in range(5):
                 film.plain[p, k] = 0
         ok = np.isfinite(sample[0, i] + sample[1, i] + sample[2, i])

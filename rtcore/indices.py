@@ -1,11 +1,12 @@
 """Eight whole numbers at a time: which rows of a table the lanes mean, and what stands there."""
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_model
 
 from rtcore.jit import inline
-from rtcore.lanes import F64, I8, I32, LANES, MASK, REAL, place_of, vec3
+from rtcore.lanes import F64, I8, I32, LANES, MASK, REAL, place_of, splatted, vec3
 
 WHOLE = ir.VectorType(I32, LANES)
 
@@ -27,9 +28,8 @@ class IndexModel(models.PrimitiveModel):
 
 
 def _same(b, number):
-    """A number in all lanes."""
-    one = b.insert_element(ir.Constant(WHOLE, ir.Undefined), b.trunc(number, I32), I32(0))
-    return b.shuffle_vector(one, ir.Constant(WHOLE, ir.Undefined), ir.Constant(WHOLE, [0] * LANES))
+    """An integer in all lanes, as int32."""
+    return splatted(b, b.trunc(number, I32))
 
 
 def _each(b, elem, load):
@@ -76,12 +76,45 @@ def chosen(tc, array, index):
 
 
 @intrinsic
-def pick(tc, array, index, column):
-    """array[index, column] as float64 lanes; array: float32 or float64, 2-D, C-contiguous."""
+def _lowest(tc, index):
+    """What lane 0 means."""
+    return types.intp(index), lambda ctx, b, sig, a: b.sext(b.extract_element(a[0], I32(0)), ir.IntType(64))
+
+
+@intrinsic
+def _alike(tc, index):
+    """Whether all lanes mean the same row."""
     def gen(ctx, b, sig, a):
-        x = _each(b, REAL[array.dtype], lambda lane: b.load(_place(ctx, b, array, a[0], a[1], lane, a[2])))
+        first = b.shuffle_vector(a[0], a[0], ir.Constant(WHOLE, [0] * LANES))
+        return b.icmp_signed("==", b.bitcast(b.icmp_signed("==", a[0], first), I8), I8(255))
+    return types.boolean(index), gen
+
+
+@inline
+def common(index):
+    """The row that all lanes mean, -1 if they mean several. `pick` and `flagged` take such a number in place of an index: one load and not
+    eight. Neighbouring rays mostly meet the same thing."""
+    return _lowest(index) if _alike(index) else -1
+
+
+@inline
+def common_chosen(array, index):
+    """`common(chosen(array, index))`."""
+    return np.intp(array[_lowest(index)]) if _alike(index) else common(chosen(array, index))
+
+
+@intrinsic
+def pick(tc, array, index, column):
+    """array[index, column] as float64 lanes; array: float32 or float64, 2-D, C-contiguous; index: an Index, or a row for all lanes."""
+    elem = REAL[array.dtype]
+
+    def gen(ctx, b, sig, a):
+        if index == INDEX:
+            x = _each(b, elem, lambda lane: b.load(_place(ctx, b, array, a[0], a[1], lane, a[2])))
+        else:
+            x = splatted(b, b.load(place_of(ctx, b, sig, a, elem, 1)))
         return x if array.dtype == types.float64 else b.fpext(x, ir.VectorType(ir.DoubleType(), LANES))
-    return F64(array, index, types.intp), gen
+    return F64(array, INDEX if index == INDEX else types.intp, types.intp), gen
 
 
 @inline
@@ -92,11 +125,14 @@ def pick3(array, index, column):
 
 @intrinsic
 def flagged(tc, array, index, flag):
-    """Mask of the lanes where array[index] has a bit of `flag` set; 1-D int8 array."""
+    """Mask of the lanes where array[index] has a bit of `flag` set; 1-D int8 array; index as for `pick`."""
     def gen(ctx, b, sig, a):
-        bits = _each(b, I8, lambda lane: b.and_(b.load(_place(ctx, b, array, a[0], a[1], lane)), b.trunc(a[2], I8)))
-        return b.icmp_signed("!=", bits, ir.Constant(bits.type, [0] * LANES))
-    return MASK(array, index, types.intp), gen
+        if index == INDEX:
+            sides = _each(b, I8, lambda lane: b.load(_place(ctx, b, array, a[0], a[1], lane)))
+        else:
+            sides = splatted(b, b.load(place_of(ctx, b, sig, a, I8, 1)))
+        return b.icmp_signed("!=", b.and_(sides, splatted(b, b.trunc(a[2], I8))), ir.Constant(sides.type, [0] * LANES))
+    return MASK(array, INDEX if index == INDEX else types.intp, types.intp), gen
 
 
 @intrinsic

@@ -6,7 +6,8 @@ in the same order; one of a later level by the ray it comes from and the way it 
 changed, the tile goes through the same stages as ever, and where a ray is known, what it meets is looked up and not traced. What an edit
 leaves valid is said in `rtcore.edits`.
 
-Seventeen bytes a ray (thirteen with float32) and four for each light that shone on it.
+Seventeen bytes a ray (thirteen with float32), four for each light that shone on it, and for hits on formulas and blobs their surface rows,
+84 bytes (44), which take longer to work out.
 """
 import threading
 from collections.abc import Iterable
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.jit import inline, kernel
-from rtcore.wave import DEAD, DX, OPAQUE, OX, START, T, Beam, Wave
+from rtcore.wave import DEAD, DX, OPAQUE, OX, START, T, Beam, Wave, padded
 
 UNKNOWN = -2            # in place of a primitive: to be traced again
 UNSEEN = -1             # in place of an optical depth: no shadow ray is known
@@ -27,8 +28,20 @@ MOST = 1 << 30          # bytes; further tiles are not kept
 class Shade(NamedTuple):
     """How far one light reaches the hits of a wave."""
 
-    depth: np.ndarray       # int32 (n): optical depth on the way, OPAQUE + the primitive that is in the way, or UNSEEN
+    depth: np.ndarray       # int32 (n, whole vectors): optical depth on the way, OPAQUE + the primitive in the way, or UNSEEN
     boxes: np.ndarray       # (m, 6): low and high corners of what came into the scene since
+
+
+def _whole(depth: np.ndarray) -> np.ndarray:
+    """The same for whole vectors."""
+    return np.concatenate([depth, np.full(padded(len(depth)) - len(depth), UNSEEN, np.int32)])
+
+
+class Rows(NamedTuple):
+    """Surface rows of some columns of a wave."""
+
+    at: np.ndarray          # int32 (k): the columns
+    rows: np.ndarray        # P (10, k): as `Wave.surface`
 
 
 class Level:
@@ -41,10 +54,12 @@ class Level:
         self.whole = True                           # no hit is UNKNOWN
         self.noted = False                          # the film has noted them
         self.shades: dict[tuple, Shade] = {}        # by what makes a light's shadows
+        self.rows: Rows | None = None               # of hits on kinds whose rows take long
 
     @property
     def nbytes(self) -> int:
-        return sum(a.nbytes for a in (self.source, self.prim, self.t, self.doubt, *(s.depth for s in self.shades.values())))
+        return sum(a.nbytes for a in (self.source, self.prim, self.t, self.doubt, *(s.depth for s in self.shades.values()),
+                                      *(self.rows or ())))
 
 
 class Known(NamedTuple):
@@ -112,6 +127,22 @@ def _note_shadows(beam, first, last, depth):
     for j in range(first, last):
         p = beam.rays.prim[j]
         depth[beam.owner[j]] = beam.rays.depth[j] if p < 0 else OPAQUE + p
+
+
+@kernel
+def _take_rows(surface, at, rows):
+    """rows (10, k) = those of a wave's columns `at`."""
+    for r in range(rows.shape[0]):
+        for j in range(len(at)):
+            rows[r, j] = surface[r, at[j]]
+
+
+@kernel
+def _put_rows(surface, at, rows):
+    """The other way."""
+    for r in range(rows.shape[0]):
+        for j in range(len(at)):
+            surface[r, at[j]] = rows[r, j]
 
 
 @kernel
@@ -255,8 +286,23 @@ class Recall:
                       rays.doubt[:n].copy())
         if depth < len(self._kept):
             for key, (kept, boxes) in self._kept[depth].shades.items():
-                level.shades[key] = Shade(np.where(self._was < 0, UNSEEN, kept[self._was]), boxes)
+                level.shades[key] = Shade(_whole(np.where(self._was < 0, UNSEEN, kept[self._was])), boxes)
         self.levels.append(level)
+
+    def rows(self, wave: Wave) -> bool:
+        """Give the wave the surface rows that are known of kinds whose rows take long; False if they are not, all of them."""
+        rows = self.levels[-1].rows
+        if self._was is not None or rows is None:
+            return False
+        _put_rows(wave.surface, *rows)
+        return True
+
+    def note_rows(self, wave: Wave, n: int, spans: Iterable[tuple[int, int]]) -> None:
+        """The wave has them now; spans: first and one past the last of the primitives of each such kind."""
+        prim = wave.rays.prim[:n]
+        at = np.concatenate([np.flatnonzero((first <= prim) & (prim < last)) for first, last in spans]).astype(np.int32)
+        self.levels[-1].rows = rows = Rows(at, np.empty((len(wave.surface), len(at)), wave.surface.dtype))
+        _take_rows(wave.surface, *rows)
 
     def kept(self) -> list[Level]:
         """All that is known of the tile now; of waves that were not wanted this time, what was known before."""
@@ -271,6 +317,11 @@ class Recall:
         """Now it has."""
         self.levels[0].noted = True
 
+    def reach(self, key: tuple) -> np.ndarray | None:
+        """How far a light is known to reach the hits of the wave at hand, as in `Shade`; None if nothing is known for sure."""
+        shade = self.levels[-1].shades.get(key)
+        return None if shade is None or len(shade.boxes) else shade.depth
+
     def shadows(self, beam: Beam, key: tuple, first: int, last: int) -> int:
         """Give one light's rays, columns first .. last - 1, what is known of their way; returns how many have to be traced."""
         shade = self.levels[-1].shades.get(key)
@@ -283,5 +334,5 @@ class Recall:
         level = self.levels[-1]
         shade = level.shades.get(key)
         if shade is None or len(shade.boxes):       # of other columns it is not known what the new boxes do
-            shade = level.shades[key] = Shade(np.full(len(level.prim), UNSEEN, np.int32), NO_BOXES)
+            shade = level.shades[key] = Shade(np.full(padded(len(level.prim)), UNSEEN, np.int32), NO_BOXES)
         _note_shadows(beam, first, last, shade.depth)

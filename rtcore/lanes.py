@@ -69,7 +69,8 @@ for _k in "xyz":
 
 # --- building blocks in LLVM ---
 
-def _splat(b, x):
+def splatted(b, x):
+    """LLVM: eight lanes of one value."""
     t = ir.VectorType(x.type, LANES)
     one = b.insert_element(ir.Constant(t, ir.Undefined), x, I32(0))
     return b.shuffle_vector(one, ir.Constant(t, ir.Undefined), ir.Constant(ir.VectorType(I32, LANES), [0] * LANES))
@@ -81,7 +82,7 @@ def _as(ctx, b, value, have, want):
         return value
     elem = want.elem if isinstance(want, Lanes) else want
     value = ctx.cast(b, value, have, elem)
-    return _splat(b, value) if isinstance(want, Lanes) else value
+    return splatted(b, value) if isinstance(want, Lanes) else value
 
 
 def llvm_math(b, name, *args):
@@ -242,7 +243,7 @@ def zero(tc, x):
 def splat(tc, number):
     """Eight lanes of one number, float32 or float64."""
     v = LANES_OF[number]
-    return v(number), lambda ctx, b, sig, a: _splat(b, a[0])
+    return v(number), lambda ctx, b, sig, a: splatted(b, a[0])
 
 
 @intrinsic
@@ -339,7 +340,7 @@ def splat3(tc, array, p, k):
 
     def gen(ctx, b, sig, a):
         start = place_of(ctx, b, sig, a, REAL[v.elem], 1)
-        return _vec3(ctx, b, Vec3(v), [_splat(b, b.load(b.gep(start, [I32(j)]))) for j in range(3)])
+        return _vec3(ctx, b, Vec3(v), [splatted(b, b.load(b.gep(start, [I32(j)]))) for j in range(3)])
     return Vec3(v)(array, types.intp, types.intp), gen
 
 
@@ -356,7 +357,7 @@ def store(tc, array, row, i, x):
 def fill(tc, array, i, number):
     """array[i .. i+7] = number; int32 array."""
     def gen(ctx, b, sig, a):
-        b.store(_splat(b, b.trunc(a[2], I32)), place_of(ctx, b, sig, a, I32, LANES), align=4)
+        b.store(splatted(b, b.trunc(a[2], I32)), place_of(ctx, b, sig, a, I32, LANES), align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, types.intp), gen
 
@@ -366,7 +367,7 @@ def exceeds(tc, array, i, number):
     """Mask of the lanes where the int32 array[i + lane] > number."""
     def gen(ctx, b, sig, a):
         ids = b.load(place_of(ctx, b, sig, a, I32, LANES), align=4)
-        return b.icmp_signed(">", ids, _splat(b, b.trunc(a[2], I32)))
+        return b.icmp_signed(">", ids, splatted(b, b.trunc(a[2], I32)))
     return MASK(array, types.intp, types.intp), gen
 
 
@@ -375,7 +376,7 @@ def store_where(tc, array, i, mask, number):
     """array[i + lane] = number in the lanes of the mask; int32 array."""
     def gen(ctx, b, sig, a):
         p = place_of(ctx, b, sig, a, I32, LANES)
-        b.store(b.select(a[2], _splat(b, b.trunc(a[3], I32)), b.load(p, align=4)), p, align=4)
+        b.store(b.select(a[2], splatted(b, b.trunc(a[3], I32)), b.load(p, align=4)), p, align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, mask, types.intp), gen
 
@@ -386,6 +387,6 @@ def add_where(tc, array, i, mask, number):
     def gen(ctx, b, sig, a):
         p = place_of(ctx, b, sig, a, I32, LANES)
         zero = ir.Constant(ir.VectorType(I32, LANES), [0] * LANES)
-        b.store(b.add(b.load(p, align=4), b.select(a[2], _splat(b, b.trunc(a[3], I32)), zero)), p, align=4)
+        b.store(b.add(b.load(p, align=4), b.select(a[2], splatted(b, b.trunc(a[3], I32)), zero)), p, align=4)
         return ctx.get_dummy_value()
     return types.void(array, types.intp, mask, types.intp), gen

@@ -3,7 +3,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rtcore.lanes import F32, I32, LANES, LANES_OF, REAL, place_of
+from rtcore.lanes import F32, I32, LANES, LANES_OF, REAL, place_of, splatted
 
 WHOLE = ir.VectorType(I32, LANES)
 COUNTING = ir.Constant(WHOLE, list(range(LANES)))
@@ -21,14 +21,13 @@ def consecutive(tc, array, i):
 
 
 @intrinsic
-def count_up(tc, array, i, first):
-    """array[i + k] = first + k for k up to 7; int32 array."""
+def count_up(tc, array, i, first, step):
+    """array[i + k] = first + k step for k up to 7; int32 array."""
     def gen(ctx, b, sig, a):
-        start = b.insert_element(ir.Constant(WHOLE, ir.Undefined), b.trunc(a[2], I32), I32(0))
-        start = b.shuffle_vector(start, start, ir.Constant(WHOLE, [0] * LANES))
-        b.store(b.add(start, COUNTING), place_of(ctx, b, sig, a, I32, LANES), align=4)
+        start, apart = (splatted(b, b.trunc(number, I32)) for number in a[2:])
+        b.store(b.add(start, b.mul(apart, COUNTING)), place_of(ctx, b, sig, a, I32, LANES), align=4)
         return ctx.get_dummy_value()
-    return types.void(array, types.intp, types.intp), gen
+    return types.void(array, types.intp, types.intp, types.intp), gen
 
 
 @intrinsic

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.across import count, lowest_bit
-from rtcore.indices import chosen, pick, pick3, rows_of
+from rtcore.indices import chosen, common_chosen, pick, pick3, rows_of
 from rtcore.jit import inline, kernel
 from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, load3, narrow, root, rounded, select, size, splat, store,
-                          wide, with_sign, zero)
-from rtcore.neighbours import consecutive, load1, store1
+                          vec3, wide, with_sign, zero)
+from rtcore.neighbours import consecutive, copy, count_up, load1, store1
 from rtcore.powers import floor
 from rtcore.latest import Latest
 from rtcore.scene import Background, Leaf, Material, invertible
@@ -113,29 +113,37 @@ def _faced(ray, surface, i):
 def glow(wave, n, look, answer):
     """Light without lights: the background, emission, and the ambient light returned; and, for lights to come, `Beam.answer` if it has
     room. Fog comes later: fade becomes 1."""
-    prim, ray, surface, light, fade = wave.rays.prim, wave.rays.ray, wave.surface, wave.light, wave.fade
-    m, of, ambient, b, lit = look.material, look.of, look.ambient, look.backdrop, answer.shape[1] > 0
+    prim, ray, light, fade, of, b = wave.rays.prim, wave.rays.ray, wave.light, wave.fade, look.of, look.backdrop
     for i in range(0, n, LANES):
         store1(fade, i, splat(np.float32(1)))
         hit, d = exceeds(prim, i, -1), wide(load3(ray, DX, i))
         up = 0.5 + 0.5 * (d.x * b[2, 0] + d.y * b[2, 1] + d.z * b[2, 2])
-        red, green, blue = b[0, 0] + up * (b[1, 0] - b[0, 0]), b[0, 1] + up * (b[1, 1] - b[0, 1]), b[0, 2] + up * (b[1, 2] - b[0, 2])
+        seen = vec3(b[0, 0] + up * (b[1, 0] - b[0, 0]), b[0, 1] + up * (b[1, 1] - b[0, 1]), b[0, 2] + up * (b[1, 2] - b[0, 2]))
         if any_lane(hit):
-            row = chosen(of, rows_of(prim, i, 0, hit))
-            color, own, share = _colors(m, row, surface, i), pick3(m, row, EMISSION), pick(m, row, AMBIENT)
-            red = select(hit, own.x + share * color.x * ambient[0], red)
-            green = select(hit, own.y + share * color.y * ambient[1], green)
-            blue = select(hit, own.z + share * color.z * ambient[2], blue)
-            if lit:
-                diffuse = pick(m, row, DIFFUSE)
-                store(answer, 0, i, narrow(diffuse * color.x))
-                store(answer, 1, i, narrow(diffuse * color.y))
-                store(answer, 2, i, narrow(diffuse * color.z))
-                store(answer, GLOSS, i, narrow(pick(m, row, SPECULAR)))
-                store(answer, POLISH, i, narrow(pick(m, row, SHININESS)))
-        store(light, 0, i, narrow(red))
-        store(light, 1, i, narrow(green))
-        store(light, 2, i, narrow(blue))
+            met = rows_of(prim, i, 0, hit)
+            row = common_chosen(of, met)
+            if row >= 0:
+                seen = select(hit, _own(wave.surface, i, look, row, answer), seen)
+            else:
+                seen = select(hit, _own(wave.surface, i, look, chosen(of, met), answer), seen)
+        store(light, 0, i, narrow(seen.x))
+        store(light, 1, i, narrow(seen.y))
+        store(light, 2, i, narrow(seen.z))
+
+
+@inline
+def _own(surface, i, look, row, answer):
+    """What hits i .. i+7 send out by themselves; how they answer lights is noted if there is room. row: their materials', as for `pick`."""
+    m, ambient = look.material, look.ambient
+    color, own, share = _colors(m, row, surface, i), pick3(m, row, EMISSION), pick(m, row, AMBIENT)
+    if answer.shape[1] > 0:
+        diffuse = pick(m, row, DIFFUSE)
+        store(answer, 0, i, narrow(diffuse * color.x))
+        store(answer, 1, i, narrow(diffuse * color.y))
+        store(answer, 2, i, narrow(diffuse * color.z))
+        store(answer, GLOSS, i, narrow(pick(m, row, SPECULAR)))
+        store(answer, POLISH, i, narrow(pick(m, row, SHININESS)))
+    return vec3(own.x + share * color.x * ambient[0], own.y + share * color.y * ambient[1], own.z + share * color.z * ambient[2])
 
 
 @kernel
@@ -217,6 +225,17 @@ def _take(child, i, made, carried, lane, owner, parent, sort):
 
 
 @inline
+def _take_all(child, i, made, carried, owner, parent):
+    """Rays i .. i+7 of the child wave: the first eight noted, all reflected, which descend from columns parent .. parent+7."""
+    for k in range(6):
+        store(child.rays.ray, k, i, load(made, k, 0))
+    for k in range(3):
+        store(child.weight, k, i, load(carried, k, 0))
+    copy(child.owner, i, owner, parent)
+    count_up(child.source, i, 2 * parent + REFLECTED, 2)
+
+
+@inline
 def _start(rays, i):
     """Let rays i .. i+7 have met nothing yet."""
     none = zero(load(rays.ray, START, i))
@@ -230,51 +249,68 @@ def _start(rays, i):
 def bounce(wave, n, look, child, counts):
     """The reflected and refracted rays of the wave's hits into `child`, which needs room for 2n; returns their number. A hit's two rays
     stand side by side, so that the order does not depend on the rest of the wave. counts[0], counts[1] grow by each sort's number."""
-    prim, ray, surface, m, of = wave.rays.prim, wave.rays.ray, wave.surface, look.material, look.of
-    like = load(ray, OX, 0)
-    made, carried = np.empty((6, 2 * LANES), ray.dtype), np.empty((3, 2 * LANES), np.float32)
+    prim, m, of = wave.rays.prim, look.material, look.of
+    made, carried = np.empty((6, 2 * LANES), wave.rays.ray.dtype), np.empty((3, 2 * LANES), np.float32)
     total = 0
     for i in range(0, n, LANES):
         hit = exceeds(prim, i, -1)
         if not any_lane(hit):
             continue
-        row = chosen(of, rows_of(prim, i, 0, hit))
-        hit = hit & ((pick(m, row, REFLECTION) > 0) | (pick(m, row, TRANSMISSION) > 0))
-        if not any_lane(hit):
+        met = rows_of(prim, i, 0, hit)
+        row = common_chosen(of, met)
+        if row >= 0:
+            if m[row, REFLECTION] > 0 or m[row, TRANSMISSION] > 0:
+                total = _onward(wave, i, hit, m, row, made, carried, child, total, counts)
             continue
-        d = wide(load3(ray, DX, i))
-        g, normal, side = _faced(ray, surface, i)
-        cosine = -(d.x * normal.x + d.y * normal.y + d.z * normal.z)
-        away = cosine <= 0      # an interpolated normal that looks away from the eye
-        normal = select(away, g, normal)
-        cosine = select(away, -(d.x * normal.x + d.y * normal.y + d.z * normal.z), cosine)
-        eta = pick(m, row, IOR)
-        eta = select(side > 0, 1 / eta, eta)
-        square = 1 - eta * eta * (1 - cosine * cosine)
-        reflection, transmission = _shares(m, row, cosine, eta, square)
-        p, err = wide(load3(surface, PX, i)), wide(load(surface, ERR, i))
-        reflected = refracted = 0
-        if any_lane(hit & (reflection > 0)):
-            way = d + normal * (2 * cosine)
-            below = way.x * g.x + way.y * g.y + way.z * g.z <= 0        # the true surface: mirror about that instead
-            way = select(below, d - g * (2 * (d.x * g.x + d.y * g.y + d.z * g.z)), way)
-            reflected = bits(hit & _go_on(made, carried, 0, wave, m, row, i, reflection, p + g * err, way, like))
-        if any_lane(hit & (transmission > 0)):
-            way = d * eta + normal * (eta * cosine - root(square))
-            refracted = bits(hit & _go_on(made, carried, LANES, wave, m, row, i, transmission, p - g * err, way, like))
-        todo = reflected | refracted
-        while todo:
-            lane = lowest_bit(todo)
-            todo &= todo - 1
-            if (reflected >> lane) & 1:
-                _take(child, total, made, carried, lane, wave.owner, i + lane, REFLECTED)
-                total += 1
-                counts[REFLECTED] += 1
-            if (refracted >> lane) & 1:
-                _take(child, total, made, carried, LANES + lane, wave.owner, i + lane, REFRACTED)
-                total += 1
-                counts[REFRACTED] += 1
+        rows = chosen(of, met)
+        hit = hit & ((pick(m, rows, REFLECTION) > 0) | (pick(m, rows, TRANSMISSION) > 0))
+        if any_lane(hit):
+            total = _onward(wave, i, hit, m, rows, made, carried, child, total, counts)
     for i in range(0, total, LANES):
         _start(child.rays, i)
     finish(child.rays, total)
+    return total
+
+
+@inline
+def _onward(wave, i, hit, m, row, made, carried, child, total, counts):
+    """The rays that come of hits i .. i+7 into the child wave from column `total` on; returns the column after the last. row: of their
+    materials, as for `pick`."""
+    ray, surface = wave.rays.ray, wave.surface
+    d, like = wide(load3(ray, DX, i)), load(ray, OX, 0)
+    g, normal, side = _faced(ray, surface, i)
+    cosine = -(d.x * normal.x + d.y * normal.y + d.z * normal.z)
+    away = cosine <= 0      # an interpolated normal that looks away from the eye
+    normal = select(away, g, normal)
+    cosine = select(away, -(d.x * normal.x + d.y * normal.y + d.z * normal.z), cosine)
+    eta = pick(m, row, IOR)
+    eta = select(side > 0, 1 / eta, eta)
+    square = 1 - eta * eta * (1 - cosine * cosine)
+    reflection, transmission = _shares(m, row, cosine, eta, square)
+    p, err = wide(load3(surface, PX, i)), wide(load(surface, ERR, i))
+    reflected = refracted = 0
+    if any_lane(hit & (reflection > 0)):
+        way = d + normal * (2 * cosine)
+        below = way.x * g.x + way.y * g.y + way.z * g.z <= 0        # the true surface: mirror about that instead
+        way = select(below, d - g * (2 * (d.x * g.x + d.y * g.y + d.z * g.z)), way)
+        reflected = bits(hit & _go_on(made, carried, 0, wave, m, row, i, reflection, p + g * err, way, like))
+    if any_lane(hit & (transmission > 0)):
+        way = d * eta + normal * (eta * cosine - root(square))
+        refracted = bits(hit & _go_on(made, carried, LANES, wave, m, row, i, transmission, p - g * err, way, like))
+    if reflected == 255 and refracted == 0:
+        _take_all(child, total, made, carried, wave.owner, i)
+        counts[REFLECTED] += LANES
+        return total + LANES
+    todo = reflected | refracted
+    while todo:
+        lane = lowest_bit(todo)
+        todo &= todo - 1
+        if (reflected >> lane) & 1:
+            _take(child, total, made, carried, lane, wave.owner, i + lane, REFLECTED)
+            total += 1
+            counts[REFLECTED] += 1
+        if (refracted >> lane) & 1:
+            _take(child, total, made, carried, LANES + lane, wave.owner, i + lane, REFRACTED)
+            total += 1
+            counts[REFRACTED] += 1
     return total

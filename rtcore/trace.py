@@ -14,7 +14,7 @@ from rtcore.flatten import Geometry, nbytes
 from rtcore.keep import Memory, Recall
 from rtcore.lanes import LANES
 from rtcore.lens import bend
-from rtcore.lights import SAMPLED, SHINE, Draw
+from rtcore.lights import SAMPLED, SHINE, UNNOTED, UNTOLD, Draw, Reach
 from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.sampling import LIGHTS
@@ -71,7 +71,7 @@ class Scratch:
         self.waves: list[Wave] = []
         self.paths: list[np.ndarray] = []           # by level, see `gloss.roughen`
         self.beam = new_beam(0, 0, dtype)
-        self.target = self.number = np.zeros(0, np.int32)
+        self.target = self.number = self.zeros = np.zeros(0, np.int32)
         self.sample, self.signs = np.zeros((3, 0), np.float32), np.zeros(0, np.float32)
 
     def renew(self) -> None:
@@ -97,6 +97,12 @@ class Scratch:
             self.paths[level] = np.ones(n * 5 // 4, np.int32)
         return self.paths[level]
 
+    def nothing(self, n: int) -> np.ndarray:
+        """For each of n hits that nothing is in its light's way."""
+        if len(self.zeros) < n:
+            self.zeros = np.zeros(padded(n * 5 // 4), np.int32)
+        return self.zeros
+
     def primary(self, n: int) -> Wave:
         """The first wave, its pixels, the numbers of its samples, what they bring and how they count, with room for n rays."""
         if len(self.target) < n:
@@ -107,7 +113,7 @@ class Scratch:
     @property
     def nbytes(self) -> int:
         """Bytes of all waves and of what belongs to them."""
-        return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.sample, self.signs))
+        return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.zeros, self.sample, self.signs))
 
     def tally(self) -> np.ndarray:
         """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
@@ -142,6 +148,8 @@ class Tracer:
         self.filter = filters.made(settings.filter) if plan.filter else None
         self.numbered = lens is not None or plan.gloss or plan.filter or any(lamp.sampled for lamp in self.lamps)
         self.fog = fogs.numbers(fog) if plan.fog else None
+        # numbers of primitives whose surface rows are kept
+        self.lasting = [(group.first, group.first + len(group.owner)) for group in geometry.groups if group.kind.lasting]
         self._code: dict[Callable, Callable] = {}
 
     def run(self, kernel: Callable, *arguments):
@@ -276,9 +284,14 @@ class Tracer:
         if recall is not None:
             recall.note_hits(wave, n)
             clock.lap(*spared)
+        given = recall is not None and bool(self.lasting) and recall.rows(wave)
         for group in self.geometry.groups:
-            self.run(group.kind.surface, wave.rays, n, wave.surface, group.table, group.first)
+            if not (given and group.kind.lasting):
+                self.run(group.kind.surface, wave.rays, n, wave.surface, group.table, group.first)
             clock.lap("surface at the hits", group.kind.name)
+        if recall is not None and self.lasting and not given:
+            recall.note_rows(wave, n, self.lasting)
+            clock.lap(*spared)
 
     def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, first: First | None) -> None:
         clock = scratch.clock
@@ -286,7 +299,10 @@ class Tracer:
             self.run(shading.glow, wave, n, self.look, NO_ANSWER)
             clock.lap(GLOW, "glow")
             return
-        together = min(max(SHADOW_RAYS // n, 1), len(self.lamps))
+        recall, share = first and first.recall, np.float32(1 / len(self.lamps))
+        reaches = self._reaches(scratch, n, recall, first.film.lit if first is not None and depth == 1 else UNNOTED, share)
+        # what a light brings at once must come before what the next one's rays bring
+        together = 1 if any(len(reach.depth) for reach in reaches) else min(max(SHADOW_RAYS // n, 1), len(self.lamps))
         beam = scratch.beams(n, together)
         self.run(shading.glow, wave, n, self.look, beam.answer)
         clock.lap(GLOW, "glow")
@@ -295,20 +311,27 @@ class Tracer:
             m, lamps, ends = 0, self.lamps[k:k + together], [0]
             for j, lamp in enumerate(lamps, k):
                 draw = (Draw(scratch.target, scratch.number, pairs + j, self.settings.seed),) if lamp.sampled else ()
-                m = self.run(lamp.shine, wave, n, lamp.numbers, lamp.color, beam, m, *draw)
+                m = self.run(lamp.shine, wave, n, lamp.numbers, lamp.color, beam, m, reaches[j], *draw)
                 ends.append(m)
                 clock.lap(f"light: {lamp.name}", f"light-{lamp.name}")
             if m == 0:
                 continue
             if self.plan.shadows:
-                known, blocked = self._shadows(clock, beam, [(lamp.key, *ends[j:j + 2]) for j, lamp in enumerate(lamps)],
-                                               first and first.recall)
+                known, blocked = self._shadows(clock, beam, [(lamp.key, *ends[j:j + 2]) for j, lamp in enumerate(lamps)], recall)
                 counts[SHADOW] += m - known
                 counts[SHADOW_HITS] -= blocked
             if first is not None and depth == 1 and len(first.film.lit):
-                films.note_lit(first.film, beam, m, scratch.target, np.float32(1 / len(self.lamps)))
+                films.note_lit(first.film, beam, m, scratch.target, share)
             counts[SHADOW_HITS] += self.run(shading.gather, wave, beam, m)
             clock.lap(f"light: {lamps[0].name}", "lit")
+
+    def _reaches(self, scratch: Scratch, n: int, recall: Recall | None, lit: np.ndarray, share: np.float32) -> list[Reach]:
+        """What is known of how far each light reaches the hits of a wave: all of it where there are no shadows."""
+        if not self.plan.shadows:
+            depths = [scratch.nothing(n)] * len(self.lamps)
+        else:
+            depths = [recall and recall.reach(lamp.key) for lamp in self.lamps]
+        return [Reach(UNTOLD if depth is None else depth, lit, scratch.target[:n], share) for depth in depths]
 
     def _shadows(self, clock: Clock, beam: Beam, parts: list[tuple], recall: Recall | None) -> tuple[int, int]:
         """What is in the way of a beam's rays, those of each light being a part (key, first column, one past the last). Returns of how many

@@ -13,7 +13,7 @@ from rtcore import adaptive, bvh, eye, film as films, filters, fog as fogs, glos
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.keep import Memory, Recall
-from rtcore.lights import SAMPLED, SHINE, Draw
+from rtcore.lights import SAMPLED, SHINE, UNNOTED, UNTOLD, Draw, Reach
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
@@ -116,7 +116,12 @@ def _keep(dtype):
     films.note_lit(films.new_film(8, 8, lit=True), beam, 0, np.zeros(0, np.int32), np.float32(1))
     recall.hits(wave, n)
     recall.note_hits(wave, n)
+    recall.note_rows(wave, n, [(0, 0)])
     recall.note_shadows(beam, (), 0, 0)
+    whole = Recall(recall.kept())
+    whole.hits(wave, n)
+    whole.note_hits(wave, n)
+    whole.rows(wave)
     memory = Memory()
     memory.tiles[b""] = recall.kept()
     memory.renumber(np.ones(0, np.int32), True, boxes)
@@ -145,7 +150,7 @@ def _light(kind):
     def compile_light(dtype):
         wave, target, n = _wave(dtype)
         draw = (Draw(target, target, 2, 0),) if kind in SAMPLED else ()
-        SHINE[kind](wave, 0, np.zeros(4), np.zeros(3), new_beam(n, 1, dtype), 0, *draw)
+        SHINE[kind](wave, 0, np.zeros(4), np.zeros(3), new_beam(n, 1, dtype), 0, Reach(UNTOLD, UNNOTED, target, np.float32(1)), *draw)
     return compile_light
 
 

@@ -1,6 +1,7 @@
 """Lights: one file each, with the authoring record and, unless it is everywhere, the kernel for its shadow rays. Listed once, here."""
 from rtcore.lights import directional, point, rectangle, sphere
 from rtcore.lights._sampled import Draw as Draw
+from rtcore.lights._shine import UNNOTED as UNNOTED, UNTOLD as UNTOLD, Reach as Reach
 from rtcore.lights.ambient import Ambient
 from rtcore.lights.directional import Directional
 from rtcore.lights.point import Point

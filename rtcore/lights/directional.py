@@ -23,10 +23,11 @@ class Directional(Light, frozen=True, kw_only=True):
 
 
 @kernel
-def shine(wave, n, light, color, beam, first):
+def shine(wave, n, light, color, beam, first, reach):
     """As that of a point light, but the way to the light has no end."""
     for i in range(0, n, LANES):
         none = zero(hit_points(wave, i).x)
-        first += shine_on(wave, i, beam, first, color, vec3(none + light[0], none + light[1], none + light[2]), none + np.inf, none + 1)
+        way = vec3(none + light[0], none + light[1], none + light[2])
+        first += shine_on(wave, i, beam, first, color, way, none + np.inf, none + 1, reach)
     finish(beam.rays, first)
     return first

@@ -24,7 +24,7 @@ class Point(Light, frozen=True, kw_only=True):
 
 
 @kernel
-def shine(wave, n, light, color, beam, first):
+def shine(wave, n, light, color, beam, first, reach):
     """Shadow rays from the hits of the wave toward a light, whose way ends on it at t = 1, and what they would bring, into the columns from
     `first` on; returns the column after the last."""
     for i in range(0, n, LANES):
@@ -33,6 +33,6 @@ def shine(wave, n, light, color, beam, first):
         square = x * x + y * y + z * z
         # a surface that contains the light is not lit by it
         strength = select(square > 0, 1 / square if light[3] != 0 else 1 + zero(square), 0)
-        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 + zero(square), strength)
+        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 + zero(square), strength, reach)
     finish(beam.rays, first)
     return first

@@ -37,7 +37,7 @@ class RectangleLight(Light, frozen=True, kw_only=True):
 
 
 @kernel
-def shine(wave, n, light, color, beam, first, draw):
+def shine(wave, n, light, color, beam, first, reach, draw):
     """As that of a point light, toward places drawn evenly from the panel, each as strong as its distance and slant let it be. A ray ends a
     thousandth of an edge before the panel, so that a shape of the same size may show it."""
     surface, ray, strength = wave.surface, beam.rays.ray, beam.bring
@@ -59,7 +59,7 @@ def shine(wave, n, light, color, beam, first, draw):
             ray[DX, at], ray[DY, at], ray[DZ, at] = x, y, z
             ray[T, at] = 1 - light[12] / height
             strength[0, at] = height / (square * np.sqrt(square))
-        way, reach = wide(load3(ray, DX, first)), wide(load(ray, T, first))
-        first += shine_on(wave, i, beam, first, color, way, reach, wide(load(strength, 0, first)))
+        way, end = wide(load3(ray, DX, first)), wide(load(ray, T, first))
+        first += shine_on(wave, i, beam, first, color, way, end, wide(load(strength, 0, first)), reach)
     finish(beam.rays, first)
     return first

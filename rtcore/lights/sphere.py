@@ -27,7 +27,7 @@ class SphereLight(Light, frozen=True, kw_only=True):
 
 
 @kernel
-def shine(wave, n, light, color, beam, first, draw):
+def shine(wave, n, light, color, beam, first, reach, draw):
     """As that of a point light, toward places of the ball, drawn evenly from the cone in which it is seen (Wang, "Physically Correct Direct
     Lighting for Distribution Ray Tracing", Graphics Gems III, 1992). A ray ends a thousandth of the radius before the ball, so that a
     shape of the same size may show it."""
@@ -63,7 +63,7 @@ def shine(wave, n, light, color, beam, first, draw):
             ray[DZ, at] = (1 - low) * z - a * sign * x - b * y
             ray[T, at] = d * (1 - low - np.sqrt(max(share - sine, 0.0))) - radius * 2.0 ** -10
             strength[0, at] = 2 / (d * d * (1 + rest))
-        way, reach = wide(load3(ray, DX, first)), wide(load(ray, T, first))
-        first += shine_on(wave, i, beam, first, color, way, reach, wide(load(strength, 0, first)))
+        way, end = wide(load3(ray, DX, first)), wide(load(ray, T, first))
+        first += shine_on(wave, i, beam, first, color, way, end, wide(load(strength, 0, first)), reach)
     finish(beam.rays, first)
     return first

@@ -4,7 +4,7 @@ import numpy as np
 
 from rtcore.indices import pick, pick3, put, put3
 from rtcore.jit import inline, inline_new
-from rtcore.lanes import LANES, greatest, load, load3, root, select, size, store, vec3, wide
+from rtcore.lanes import LANES, bits, greatest, load, load3, root, select, size, store, vec3, wide
 from rtcore.shapes.kind import REACH
 from rtcore.wave import DX, ERR, GX, NX, OX, PX, T, U, V
 
@@ -12,6 +12,18 @@ from rtcore.wave import DX, ERR, GX, NX, OX, PX, T, U, V
 @inline
 def normalized(v):
     """A vector at length 1, without overflow or underflow; the zero vector becomes z."""
+    square = v.x * v.x + v.y * v.y + v.z * v.z
+    over = 1 / root(square)
+    ordinary = (square > 1e-280) & (square < 1e280)
+    made = vec3(v.x * over, v.y * over, v.z * over)
+    if bits(ordinary) != 255:       # what becomes of a lane must not hang on the others
+        made = select(ordinary, made, _normalized_slowly(v))
+    return made
+
+
+@inline
+def _normalized_slowly(v):
+    """The same for any vector: seven divisions and roots in place of two, which were half the time of casting eye rays."""
     most = greatest(size(v.x), greatest(size(v.y), size(v.z)))
     x, y, z = v.x / most, v.y / most, v.z / most
     length = root(x * x + y * y + z * z)

@@ -243,4 +243,4 @@ def _bounds(data, extra):
 
 
 _PAIR = Blob([((0, 0, 0), 1, 1), ((1, 0, 0), 1, -0.5)], 0.25)
-BLOB = Kind("blob", intersect, surface, _bounds, (_PAIR, ()), leaf_most=1, shared_extra=True)
+BLOB = Kind("blob", intersect, surface, _bounds, (_PAIR, ()), leaf_most=1, lasting=True, shared_extra=True)

@@ -9,7 +9,7 @@ from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, n
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.expansions import LONG, expand
-from rtcore.indices import among, rows_of
+from rtcore.indices import among, common, rows_of
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import (LANES, any_lane, bits, greatest, least, load, load3, rounded, select, size, splat3, vec3, wide, with_sign, zero)
 from rtcore.pairs import divide, subtract
@@ -194,18 +194,28 @@ def surface(rays, n, out, table, first):
     for i in range(0, n, LANES):
         ok = among(prim, i, first, first + data.shape[0])
         if any_lane(ok):
-            q = rows_of(prim, i, first, ok)
-            p = unit_hits(rays, i, data, q)
-            x, y, z, one = size(p.x), size(p.y), size(p.z), 1 + zero(p.x)
-            # the face is the one whose plane the point is nearest to; the point is put onto it
-            on_x = (x >= y) & (x >= z)
-            on_y = (y >= z) & ~on_x
-            on_z = ~on_x & ~on_y
-            a, b, c = with_sign(one, p.x), with_sign(one, p.y), with_sign(one, p.z)
-            put_all_placed(out, i, ok, data, q, vec3(select(on_x, a, p.x), select(on_y, b, p.y), select(on_z, c, p.z)),
-                           vec3(select(on_x, a, 0), select(on_y, b, 0), select(on_z, c, 0)))
-            u, v = select(on_x, p.y, select(on_y, p.z, p.x)), select(on_x, p.z, select(on_y, p.x, p.y))
-            put_coordinates(out, i, ok, (u + 1) / 2, (v + 1) / 2)
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                _put_boxes(rays, i, ok, out, data, row)
+            else:
+                _put_boxes(rays, i, ok, out, data, rows)
+
+
+@inline
+def _put_boxes(rays, i, ok, out, data, q):
+    """Surface rows of hits on boxes q."""
+    p = unit_hits(rays, i, data, q)
+    x, y, z, one = size(p.x), size(p.y), size(p.z), 1 + zero(p.x)
+    # the face is the one whose plane the point is nearest to; the point is put onto it
+    on_x = (x >= y) & (x >= z)
+    on_y = (y >= z) & ~on_x
+    on_z = ~on_x & ~on_y
+    a, b, c = with_sign(one, p.x), with_sign(one, p.y), with_sign(one, p.z)
+    put_all_placed(out, i, ok, data, q, vec3(select(on_x, a, p.x), select(on_y, b, p.y), select(on_z, c, p.z)),
+                   vec3(select(on_x, a, 0), select(on_y, b, 0), select(on_z, c, 0)))
+    u, v = select(on_x, p.y, select(on_y, p.z, p.x)), select(on_x, p.z, select(on_y, p.x, p.y))
+    put_coordinates(out, i, ok, (u + 1) / 2, (v + 1) / 2)
 
 
 def _bounds(data, extra):

@@ -264,4 +264,5 @@ def line_roots(shape: Implicit, matrix: np.ndarray, origin, direction, side: int
     return [float(t) for t, often in roots[:count] for _ in range(int(often))]
 
 
-IMPLICIT = Kind("implicit", intersect, surface, _bounds, (Implicit("x^2 + y^2 + z^2 - 1", (-1, -1, -1), (1, 1, 1)), ()), leaf_most=1)
+IMPLICIT = Kind("implicit", intersect, surface, _bounds, (Implicit("x^2 + y^2 + z^2 - 1", (-1, -1, -1), (1, 1, 1)), ()), leaf_most=1,
+                lasting=True)

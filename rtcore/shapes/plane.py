@@ -5,7 +5,7 @@ import numpy as np
 
 from rtcore.exact import moved
 from rtcore.fields import Vec, Vector
-from rtcore.indices import among, rows_of
+from rtcore.indices import among, common, rows_of
 from rtcore.jit import kernel
 from rtcore.lanes import LANES, any_lane, bits
 from rtcore.scene import Shape, invertible
@@ -52,7 +52,12 @@ def surface(rays, n, out, table, first):
     for i in range(0, n, LANES):
         ok = among(prim, i, first, first + data.shape[0])
         if any_lane(ok):
-            put_flats(rays, i, ok, out, data, rows_of(prim, i, first, ok), 3)
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                put_flats(rays, i, ok, out, data, row, 3)
+            else:
+                put_flats(rays, i, ok, out, data, rows, 3)
 
 
 PLANE = Kind("plane", intersect, surface, None, (Plane((0, 0, 0), (0, 1, 0)), ()))

@@ -9,7 +9,7 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vectors
-from rtcore.indices import among, rows_of
+from rtcore.indices import among, common, rows_of
 from rtcore.jit import inline, kernel
 from rtcore.lanes import LANES, any_lane, bits, load, size, wide
 from rtcore.pairs import add, divide, multiply, scale, subtract, two_sum
@@ -175,7 +175,12 @@ def surface(rays, n, out, table, first):
     for i in range(0, n, LANES):
         ok = among(prim, i, first, first + data.shape[0])
         if any_lane(ok):
-            put_flats(rays, i, ok, out, data, rows_of(prim, i, first, ok), FLAT)
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                put_flats(rays, i, ok, out, data, row, FLAT)
+            else:
+                put_flats(rays, i, ok, out, data, rows, FLAT)
 
 
 def _bounds(data, extra):

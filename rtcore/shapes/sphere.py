@@ -14,7 +14,7 @@ from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, n
 from rtcore.exact import inverse, moved, parts
 from rtcore.expansions import LONG, expand, noise_of
 from rtcore.fields import Number, Vec, Vector
-from rtcore.indices import among, pick, pick3, rows_of
+from rtcore.indices import among, common, pick, pick3, rows_of
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import LANES, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
 from rtcore.pairs import two_sum
@@ -157,12 +157,22 @@ def surface(rays, n, out, table, first):
     for i in range(0, n, LANES):
         ok = among(prim, i, first, first + data.shape[0])
         if any_lane(ok):
-            q = rows_of(prim, i, first, ok)
-            c, r = pick3(data, q, 0), pick(data, q, 3) * pick(data, q, 4)
-            normal = normalized(hits_from(rays, i, c))
-            # the point is brought back onto the sphere: its error does not grow with the distance of the eye
-            put_surfaces(out, i, ok, c + normal * r, normal, extent_of(c) + r)
-            put_globe(out, i, ok, room, normal)
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                _put_spheres(rays, i, ok, out, data, row, room)
+            else:
+                _put_spheres(rays, i, ok, out, data, rows, room)
+
+
+@inline
+def _put_spheres(rays, i, ok, out, data, q, room):
+    """Surface rows of hits on spheres q."""
+    c, r = pick3(data, q, 0), pick(data, q, 3) * pick(data, q, 4)
+    normal = normalized(hits_from(rays, i, c))
+    # the point is brought back onto the sphere: its error does not grow with the distance of the eye
+    put_surfaces(out, i, ok, c + normal * r, normal, extent_of(c) + r)
+    put_globe(out, i, ok, room, normal)
 
 
 @inline
@@ -241,10 +251,20 @@ def surface_ellipsoid(rays, n, out, table, first):
     for i in range(0, n, LANES):
         ok = among(prim, i, first, first + data.shape[0])
         if any_lane(ok):
-            q = rows_of(prim, i, first, ok)
-            p = normalized(unit_hits(rays, i, data, q))
-            put_all_placed(out, i, ok, data, q, p, p)
-            put_globe(out, i, ok, room, p)
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                _put_ellipsoids(rays, i, ok, out, data, row, room)
+            else:
+                _put_ellipsoids(rays, i, ok, out, data, rows, room)
+
+
+@inline
+def _put_ellipsoids(rays, i, ok, out, data, q, room):
+    """Surface rows of hits on ellipsoids q."""
+    p = normalized(unit_hits(rays, i, data, q))
+    put_all_placed(out, i, ok, data, q, p, p)
+    put_globe(out, i, ok, room, p)
 
 
 def _bounds(data, extra):
