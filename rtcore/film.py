@@ -13,7 +13,7 @@ import numpy as np
 
 from rtcore.across import count
 from rtcore.jit import inline, kernel
-from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, store, wide
+from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, splat, store, wide
 from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, store1, store_triples, turns
 from rtcore.sampling import REPLICATES
 from rtcore.wave import DEPTH_UNIT, NX, T
@@ -59,14 +59,21 @@ def clear(film: Film) -> None:
 
 
 @kernel
-def note_first_hits(film, wave, n, target):
-    """Which primitive each primary ray hit, how far away, and the normal there."""
+def note_first_hits(film, wave, n, target, anew):
+    """Which primitive each primary ray hit, how far away, and the normal there, without a doubt, if that is to be noted anew; and that no
+    light has reached it so far."""
     for i in range(0, n, LANES):
         if i + LANES <= n and consecutive(target, i):
-            _note_eight(film, target[i], wave.rays, wave.surface, i)
+            if anew:
+                _note_eight(film, target[i], wave.rays, wave.surface, i)
+            if film.lit.shape[0] > 0:
+                store1(film.lit, target[i], splat(np.float32(0)))
             continue
         for j in range(i, min(i + LANES, n)):
-            _note_one(film, target[j], wave.rays, wave.surface, j)
+            if anew:
+                _note_one(film, target[j], wave.rays, wave.surface, j)
+            if film.lit.shape[0] > 0:
+                film.lit[target[j]] = 0
 
 
 @inline
@@ -74,6 +81,8 @@ def _note_eight(film, p, rays, surface, i):
     """What rays i .. i+7, of pixels p .. p+7, hit."""
     hit, normal = exceeds(rays.prim, i, -1), load3(surface, NX, i)
     copy(film.prim, p, rays.prim, i)
+    for k in range(LANES):
+        film.doubt[p + k] = 0
     store1(film.distance, p, narrow(load(rays.ray, T, i)))
     store_triples(film.normal, p, narrow(select(hit, normal.x, 0)), narrow(select(hit, normal.y, 0)), narrow(select(hit, normal.z, 0)))
 
@@ -81,7 +90,7 @@ def _note_eight(film, p, rays, surface, i):
 @inline
 def _note_one(film, p, rays, surface, i):
     """What ray i, of pixel p, hits."""
-    film.prim[p] = rays.prim[i]
+    film.prim[p], film.doubt[p] = rays.prim[i], 0
     film.distance[p] = rays.ray[T, i]
     for k in range(3):
         film.normal[p, k] = surface[NX + k, i] if rays.prim[i] >= 0 else 0
@@ -107,9 +116,14 @@ def note_lit(film, beam, n, target, share):
 
 
 @kernel
-def deposit(wave, n, sample):
-    """Add the wave's light to the primary rays it descends from; sample (3, primary rays)."""
+def deposit(wave, n, sample, primary):
+    """Add the wave's light to the primary rays it descends from; sample (3, primary rays). Of those themselves it is the first."""
     owner, weight, light = wave.owner, wave.weight, wave.light
+    if primary:
+        for i in range(0, n, LANES):
+            for k in range(3):
+                store(sample, k, i, load(weight, k, i) * load(light, k, i))
+        return
     for i in range(0, n, LANES):
         if i + LANES <= n and consecutive(owner, i):
             for k in range(3):

@@ -22,6 +22,7 @@ UNKNOWN = -2            # in place of a primitive: to be traced again
 UNSEEN = -1             # in place of an optical depth: no shadow ray is known
 BOXES = 64              # that may have been added before what is kept is given up
 NO_BOXES = np.zeros((0, 6))
+UNMOVED = np.zeros(0, np.int32)
 MOST = 1 << 30          # bytes; further tiles are not kept
 
 
@@ -44,6 +45,15 @@ class Rows(NamedTuple):
     rows: np.ndarray        # P (10, k): as `Wave.surface`
 
 
+class Known(NamedTuple):
+    """How many rays of a wave needed no tracing: all, those that hit something, those reflected and those refracted."""
+
+    rays: int
+    hits: int
+    reflected: int
+    refracted: int
+
+
 class Level:
     """One wave of a tile, n rays: int32 `source` (n) as `Wave` has it, 0 for the eye's; what they met, int32 `prim` (n), `t` (n) in the
     render's precision, uint8 `doubt` (n), as `Rays` has them."""
@@ -52,23 +62,23 @@ class Level:
         self.source, self.prim, self.t, self.doubt = source, prim, t, doubt
         self.boxes = NO_BOXES
         self.whole = True                           # no hit is UNKNOWN
+        self._told: Known | None = None
         self.noted = False                          # the film has noted them
         self.shades: dict[tuple, Shade] = {}        # by what makes a light's shadows
         self.rows: Rows | None = None               # of hits on kinds whose rows take long
 
     @property
+    def told(self) -> Known:
+        """What a wave is told of which all is known."""
+        if self._told is None:
+            n, refracted = len(self.prim), int(np.count_nonzero(self.source & 1))
+            self._told = Known(n, int(np.count_nonzero(self.prim >= 0)), n - refracted, refracted)
+        return self._told
+
+    @property
     def nbytes(self) -> int:
         return sum(a.nbytes for a in (self.source, self.prim, self.t, self.doubt, *(s.depth for s in self.shades.values()),
                                       *(self.rows or ())))
-
-
-class Known(NamedTuple):
-    """How many rays of a wave needed no tracing: all, those that hit something, those reflected and those refracted."""
-
-    rays: int
-    hits: int
-    reflected: int
-    refracted: int
 
 
 @inline
@@ -88,6 +98,31 @@ def _near(ray, i, far, boxes):
         if enter <= leave:
             return True
     return False
+
+
+@kernel
+def _recall_all(rays, prim, t, doubt):
+    """Give all rays their known hits."""
+    for i in range(len(prim)):
+        rays.ray[T, i] = t[i]
+    for i in range(len(prim)):
+        rays.prim[i] = prim[i]
+        rays.doubt[i] = doubt[i]
+
+
+@kernel
+def _match(source, parents, old, was):
+    """was, int32 (n): the kept columns, of which `old` are the sources, of rays with these sources; -1 where there is none. parents: those
+    of the rays that they come from; length 0: they are their own. Sources grow from column to column, here and there."""
+    j = 0
+    for i in range(len(source)):
+        wanted = source[i]
+        if len(parents) > 0:
+            parent = parents[wanted >> 1]
+            wanted = 2 * parent + (wanted & 1) if parent >= 0 else -1
+        while j < len(old) and old[j] < wanted:
+            j += 1
+        was[i] = j if j < len(old) and old[j] == wanted else -1
 
 
 @kernel
@@ -242,6 +277,7 @@ class Recall:
     def __init__(self, kept: list[Level]):
         self._kept = kept
         self.levels: list[Level] = []
+        self.grown = False                      # something is known that was not
         self._was: np.ndarray | None = None     # the kept column of each ray of the wave at hand, -1 unknown; None: its own
 
     def hits(self, wave: Wave, n: int) -> Known:
@@ -253,9 +289,9 @@ class Recall:
         elif depth > 0:
             self._was = self._matched(old, source)
         if self._was is None and old.whole and not len(old.boxes):
-            rays, refracted = wave.rays, int(np.count_nonzero(old.source & 1))
-            rays.ray[T, :n], rays.prim[:n], rays.doubt[:n] = old.t, old.prim, old.doubt
-            return Known(n, int(np.count_nonzero(old.prim >= 0)), n - refracted, refracted)
+            _recall_all(wave.rays, old.prim, old.t, old.doubt)
+            return old.told
+        wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
         known = np.zeros(4, np.int64)
         if old is not None:
             self._was = np.arange(n, dtype=np.int32) if self._was is None else self._was
@@ -264,15 +300,11 @@ class Recall:
 
     def _matched(self, old: Level, source: np.ndarray) -> np.ndarray | None:
         """The kept columns of rays that come from those of the wave before."""
-        if self._was is None:
-            if np.array_equal(source, old.source):
-                return None
-            wanted = source
-        else:
-            parent = self._was[source >> 1]
-            wanted = np.where(parent < 0, -1, 2 * parent + (source & 1)).astype(np.int32)
-        at = np.minimum(np.searchsorted(old.source, wanted), len(old.source) - 1)
-        return np.where(old.source[at] == wanted, at, -1).astype(np.int32)
+        if self._was is None and np.array_equal(source, old.source):
+            return None
+        was = np.empty(len(source), np.int32)
+        _match(source, UNMOVED if self._was is None else self._was, old.source, was)
+        return was
 
     def note_hits(self, wave: Wave, n: int) -> None:
         """The wave has met what it meets."""
@@ -282,6 +314,7 @@ class Recall:
             return
         if depth < len(self._kept):     # kernels that can doubt have begun anew, for known rays too
             rays.doubt[:n] = np.where(self._was < 0, rays.doubt[:n], self._kept[depth].doubt[self._was])
+        self.grown = True
         level = Level(np.zeros(n, np.int32) if depth == 0 else wave.source[:n].copy(), rays.prim[:n].copy(), rays.ray[T, :n].copy(),
                       rays.doubt[:n].copy())
         if depth < len(self._kept):
@@ -301,6 +334,7 @@ class Recall:
         """The wave has them now; spans: first and one past the last of the primitives of each such kind."""
         prim = wave.rays.prim[:n]
         at = np.concatenate([np.flatnonzero((first <= prim) & (prim < last)) for first, last in spans]).astype(np.int32)
+        self.grown = True
         self.levels[-1].rows = rows = Rows(at, np.empty((len(wave.surface), len(at)), wave.surface.dtype))
         _take_rows(wave.surface, *rows)
 
@@ -331,7 +365,7 @@ class Recall:
 
     def note_shadows(self, beam: Beam, key: tuple, first: int, last: int) -> None:
         """They have met what they meet."""
-        level = self.levels[-1]
+        self.grown, level = True, self.levels[-1]
         shade = level.shades.get(key)
         if shade is None or len(shade.boxes):       # of other columns it is not known what the new boxes do
             shade = level.shades[key] = Shade(np.full(padded(len(level.prim)), UNSEEN, np.int32), NO_BOXES)

@@ -4,6 +4,7 @@ import math
 from rtcore.schedule import COARSEST, LATTICES, TILE
 
 EDGES = (2 * TILE, TILE, TILE // 2, TILE // 4)
+SPARSE = {16: TILE // 2, 8: TILE // 2, 4: TILE}     # edges, by the spacing, at which a lattice still is enough tiles for several threads
 LONG = 0.012        # seconds that a tile may take: then its thread sees that it is not wanted any more
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
 
@@ -47,9 +48,8 @@ class Pace:
                 return spacing
         return 1 if known and self._known is None else COARSEST
 
-    def edge(self) -> int:
-        """Lattice points along the edge of a tile: a large one has fewer calls a ray."""
-        each = self.seconds(1)
-        if each is None:
-            return TILE
-        return next((edge for edge in EDGES if edge ** 2 * each <= LONG), EDGES[-1])
+    def edge(self, spacing: int) -> int:
+        """Lattice points along the edge of a tile: a large one has fewer calls a ray, of which each takes some microseconds of Python."""
+        each = self.seconds(spacing)
+        edge = TILE if each is None else next((edge for edge in EDGES if edge ** 2 * each <= LONG), EDGES[-1])
+        return min(edge, SPARSE.get(spacing, edge))

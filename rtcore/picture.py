@@ -65,7 +65,7 @@ class Start(NamedTuple):
     memory: Memory | None       # what is known of its first samples
     coarse: bool                # lattice by lattice
     first: int                  # spacing of the finest one in the first pass
-    edge: int                   # of the tiles
+    edges: dict[int, int]       # of the tiles, in lattice points, by the lattice's spacing, as far as they are chosen
     soon: float                 # seconds after which the first pass shows what it has
     goes_on: bool               # the samples of the one before are its own
     threads: int
@@ -76,7 +76,7 @@ class Render:
 
     def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, pool: ThreadPoolExecutor, start: Start):
         scene, camera, self.settings = self.request = request
-        before, self.edits, self.memory, self.coarse, first, self.edge, self.soon, goes_on, threads = start
+        before, self.edits, self.memory, self.coarse, first, self.edges, self.soon, goes_on, threads = start
         self.plan, self.pace, self.pool = composed, pace, pool
         self.with_light = VIEW[self.settings.view].needs_light
         self.finished = False   # the pass
@@ -157,7 +157,9 @@ class Render:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
         a thread, ends the threads' work first."""
         one, size = self.schedule[self.number], self.settings.size
-        queue = tiles(one, *size, self.edge)
+        for spacing in (*one.coarser, one.spacing):
+            self.edges.setdefault(spacing, self.pace.edge(spacing))
+        queue = tiles(one, *size, self.edges)
         share = weight(one, *size)
         each = share / max(len(queue), 1)
         todo, halt = iter(queue), threading.Event()

@@ -26,7 +26,7 @@ from rtcore.pace import Pace
 from rtcore.picture import PARTIAL, Frame as Frame, Render, RenderRequest, Start
 from rtcore.plan import Plan, plan
 from rtcore.scene import Scene
-from rtcore.schedule import COARSEST, passes, tiles
+from rtcore.schedule import COARSEST, LATTICES, passes, tiles
 from rtcore.settings import Settings
 from rtcore.trace import NONFINITE
 
@@ -143,18 +143,19 @@ class Renderer:
                 memory = self._remember(before, what, geometry, request.scene)
             if "nodes" in what.edits:
                 pace.forget()
-        edge = before.edge if memory is not None and memory.tiles or goes_on else pace.edge()
+        edges = dict(before.edges) if memory is not None and memory.tiles or goes_on else {}
         first, soon, size = COARSEST, PARTIAL, request.settings.size
         if deadline is not None:
             soon = max(deadline - pace.frame, deadline / 4)
-            known = memory is not None and all(memory.covers(tiles(one, *size, edge)) for one in passes(coarse))
+            known = memory is not None and edges.keys() >= set(LATTICES if coarse else LATTICES[-1:]) and all(
+                memory.covers(tiles(one, *size, edges)) for one in passes(coarse))
             if known:
                 deadline = max(deadline, KNOWN)
                 if all(what.extent(step) == KEPT for step in ("hits", "onward", "shadows")):
                     soon = max(soon, KNOWN)     # nothing is to be traced: whole pictures, though they be a little late
             first = pace.finest(size[0] * size[1], self._threads, deadline, known)
         return Render(request, composed, geometry, pace, self._pool, Start(
-            before, what.edits, memory, coarse, first, edge, soon, goes_on, self._threads))
+            before, what.edits, memory, coarse, first, edges, soon, goes_on, self._threads))
 
     def _remember(self, before: Render, what: Change, geometry: Geometry, scene: Scene) -> Memory:
         """What was kept of the picture before, as far as it still holds."""

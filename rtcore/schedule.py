@@ -1,4 +1,5 @@
 """The order in which a picture is traced: lattices from coarse to fine, whole samples, then lists of single pixels."""
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -6,6 +7,7 @@ import numpy as np
 LATTICES = (16, 8, 4, 2, 1)     # their spacings
 COARSEST = LATTICES[0]
 TILE = 64           # lattice points along a tile's edge: 4,096 rays, some milliseconds
+EVEN = dict.fromkeys(LATTICES, TILE)
 BLOCK = 8           # pixels along the edge of what is traced together
 
 
@@ -47,16 +49,17 @@ def weight(one: Pass, width: int, height: int) -> float:
     return len(one.samples) * (0.75 if one.skip and not one.coarser else 1.0) / one.spacing ** 2
 
 
-def tiles(one: Pass, width: int, height: int, edge: int = TILE) -> list[np.ndarray]:
-    """What the threads take one after the other: tiles as `eye.cast` takes them, `edge` lattice points wide, coarse lattices first, each
-    from the middle of the picture outward; or parts of the list that have about as many rays."""
+def tiles(one: Pass, width: int, height: int, edges: Mapping[int, int] = EVEN) -> list[np.ndarray]:
+    """What the threads take one after the other: tiles as `eye.cast` takes them, coarse lattices first, each from the middle of the picture
+    outward; or parts of the list that have about as many rays. edges: by the lattice's spacing, how many lattice points a tile is wide."""
     if one.pixels is not None:
+        edge = edges[1]
         rays = np.cumsum(one.pixels[:, 2] - one.pixels[:, 1])
         cuts = np.searchsorted(rays, np.arange(edge ** 2, rays[-1], edge ** 2))
         return [part for part in np.split(one.pixels, cuts) if len(part)]
     result = []
     for spacing in (*one.coarser, one.spacing):
-        columns, rows = -(-width // spacing), -(-height // spacing)
+        columns, rows, edge = -(-width // spacing), -(-height // spacing), edges[spacing]
         skip = one.skip and spacing < COARSEST
         result += [np.array([x, y, min(edge, columns - x), min(edge, rows - y), spacing, skip, width, height], np.int64)
                    for x, y in _corners(columns, rows, edge)]
@@ -66,7 +69,7 @@ def tiles(one: Pass, width: int, height: int, edge: int = TILE) -> list[np.ndarr
     return result
 
 
-def _corners(columns: int, rows: int, edge: int = TILE) -> list[tuple[int, int]]:
+def _corners(columns: int, rows: int, edge: int) -> list[tuple[int, int]]:
     corners = [(x, y) for y in range(0, rows, edge) for x in range(0, columns, edge)]
     return sorted(corners, key=lambda c: (c[0] + edge / 2 - columns / 2) ** 2 + (c[1] + edge / 2 - rows / 2) ** 2)
 
@@ -78,5 +81,5 @@ def tile_order(width: int, height: int) -> np.ndarray:
     number[:height, :width] = np.arange(height * width, dtype=np.int32).reshape(height, width)
     parts = TILE // BLOCK
     number = number.reshape(down, parts, BLOCK, across, parts, BLOCK).transpose(0, 3, 1, 4, 2, 5).reshape(down * across, -1)
-    number = number[[y // TILE * across + x // TILE for x, y in _corners(width, height)]].ravel()
+    number = number[[y // TILE * across + x // TILE for x, y in _corners(width, height, TILE)]].ravel()
     return number[number >= 0]

@@ -20,6 +20,7 @@ from rtcore.scene import Background, Fog
 from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
+from rtcore.shapes._surface import find_kinds
 from rtcore.wave import NO_ANSWER, Beam, Wave, new_beam, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
@@ -106,7 +107,7 @@ class Scratch:
     def primary(self, n: int) -> Wave:
         """The first wave, its pixels, the numbers of its samples, what they bring and how they count, with room for n rays."""
         if len(self.target) < n:
-            self.target, self.number, self.sample = np.empty(n, np.int32), np.empty(n, np.int32), np.empty((3, n), np.float32)
+            self.target, self.number, self.sample = np.empty(n, np.int32), np.empty(n, np.int32), np.empty((3, padded(n)), np.float32)
             self.signs = np.empty(n, np.float32)
         return self.wave(0, n)
 
@@ -125,6 +126,10 @@ class Scratch:
             self.tallied += self.beam.rays.tally
             self.beam = new_beam(n * 5 // 4, lights, self.dtype)
         return self.beam
+
+
+class Stale(Exception):
+    """What is being traced is not wanted any more."""
 
 
 class First(NamedTuple):
@@ -148,6 +153,7 @@ class Tracer:
         self.filter = filters.made(settings.filter) if plan.filter else None
         self.numbered = lens is not None or plan.gloss or plan.filter or any(lamp.sampled for lamp in self.lamps)
         self.fog = fogs.numbers(fog) if plan.fog else None
+        self.ends = np.array([group.first + len(group.owner) for group in geometry.groups], np.int64)
         # numbers of primitives whose surface rows are kept
         self.lasting = [(group.first, group.first + len(group.owner)) for group in geometry.groups if group.kind.lasting]
         self._code: dict[Callable, Callable] = {}
@@ -176,7 +182,7 @@ class Tracer:
         recall = None if memory is None else memory.recall(tile)
         if not self._trace(scratch, film, wave, n, stale, First(film, recall)):
             return False
-        if recall is not None:
+        if recall is not None and recall.grown:
             memory.keep(tile, recall)
         return True
 
@@ -194,8 +200,7 @@ class Tracer:
 
     def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, stale: Callable[[], bool], first: First | None = None) -> bool:
         """Follow a wave of primary rays and add what it brings to the film; note what it hits if it holds its pixels' first samples."""
-        counts, clock = np.zeros_like(scratch.counts), scratch.clock
-        scratch.sample[:, :n] = 0
+        counts, clock = np.zeros(len(COUNTS), np.int64), scratch.clock
         clock.lap("primary rays", "core")
         if self.filter is not None and first is None:   # a first sample is the pixel's centre
             filters.spread(wave, n, scratch.target, scratch.number, self.view, self.settings.size[0], self.filter.place, self.filter.sign,
@@ -204,12 +209,17 @@ class Tracer:
         if self.lens is not None and first is None:     # and goes through the middle
             bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
             clock.lap("depth of field", "lens")
-        counts[PRIMARY], counts[PRIMARY_HITS] = n, 0
-        self.hit(clock, wave, n, counts, first)
-        counts[PRIMARY_HITS] += np.count_nonzero(wave.rays.prim[:n] >= 0)
-        if first is not None:
-            self._note(scratch, film, wave, n, first.recall)
-        if VIEW[self.settings.view].needs_light and not self._follow(scratch, wave, n, counts, stale, first):
+        counts[PRIMARY] = n
+        try:
+            self._hit(clock, wave, n, counts, stale, first)
+            counts[PRIMARY_HITS] += np.count_nonzero(wave.rays.prim[:n] >= 0)
+            if first is not None:
+                self._note(scratch, film, wave, n, first.recall)
+            if VIEW[self.settings.view].needs_light:
+                self._follow(scratch, wave, n, counts, stale, first)
+            else:
+                scratch.sample[:, :n] = 0
+        except Stale:
             return False
         if len(film.plain):
             if first is not None:
@@ -223,11 +233,10 @@ class Tracer:
 
     def _note(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, recall: Recall | None) -> None:
         """Note on the film what first samples hit, unless it is there from before."""
-        if len(film.lit):       # what a tile that was given up has noted does not count
-            film.lit[scratch.target[:n]] = 0
-        if recall is None or not recall.noted:
-            self.run(films.note_first_hits, film, wave, n, scratch.target)
-            film.doubt[scratch.target[:n]] = 0
+        anew = recall is None or not recall.noted
+        if anew or len(film.lit):       # what a tile that was given up has noted of lights does not count
+            self.run(films.note_first_hits, film, wave, n, scratch.target, anew)
+        if anew:
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
@@ -235,22 +244,22 @@ class Tracer:
             recall.note_film()
         scratch.clock.lap("film", "core")
 
-    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale, first: First | None) -> bool:
-        """Light a wave that has hit, and all that comes of it, level by level; False if stale."""
+    def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale: Callable[[], bool], first: First | None) -> None:
+        """Light a wave that has hit, and all that comes of it, level by level."""
         clock = scratch.clock
         for depth in range(1, self.settings.max_depth + 1):
             if depth > 1:
-                self.hit(clock, wave, n, counts, first)
-            self._light(scratch, wave, n, depth, counts, first)
+                self._hit(clock, wave, n, counts, stale, first)
+            self._light(scratch, wave, n, depth, counts, stale, first)
             if self.fog is not None:
                 self.run(fogs.dim, wave, n, self.fog)
                 clock.lap("fog", "fog")
-            self.run(films.deposit, wave, n, scratch.sample)
+            self.run(films.deposit, wave, n, scratch.sample, depth == 1)
             clock.lap("film", "glow")
             if stale():
-                return False
+                raise Stale
             if not self.plan.bounces or depth == self.settings.max_depth:
-                return True
+                return
             child = scratch.wave(depth, 2 * n)
             sent = self.run(shading.bounce, wave, n, self.look, child, counts)
             clock.lap("reflected and refracted rays", "bounce")
@@ -260,14 +269,14 @@ class Tracer:
                 clock.lap("glossy reflection", "gloss")
             n, wave = sent, child
             if n == 0:
-                return True
-        return True
+                return
 
-    def hit(self, clock: Clock, wave: Wave, n: int, counts: np.ndarray, first: First | None) -> None:
+    def _hit(self, clock: Clock, wave: Wave, n: int, counts: np.ndarray, stale: Callable[[], bool], first: First | None) -> None:
         """Nearest hits and their surfaces. Rays of which they are known are not traced, nor counted."""
         recall, known, spared = first and first.recall, 0, ("primary rays", "core")     # looking up counts to what it spares
-        wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
-        if recall is not None:
+        if recall is None:
+            wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
+        else:
             primary = not recall.levels
             known, hits, reflected, refracted = recall.hits(wave, n)
             if primary:
@@ -281,19 +290,24 @@ class Tracer:
         for group in self.geometry.groups if known < n else ():
             self.run(group.kind.intersect, wave.rays, n, group.tree, group.table, group.first, CLOSEST)
             clock.lap(f"hits: {group.kind.name}", group.kind.name)
+            if stale():
+                raise Stale
         if recall is not None:
             recall.note_hits(wave, n)
             clock.lap(*spared)
         given = recall is not None and bool(self.lasting) and recall.rows(wave)
-        for group in self.geometry.groups:
-            if not (given and group.kind.lasting):
+        found = np.zeros(len(self.ends), bool)
+        self.run(find_kinds, wave.rays.prim, n, self.ends, found)
+        for group, there in zip(self.geometry.groups, found):
+            if there and not (given and group.kind.lasting):
                 self.run(group.kind.surface, wave.rays, n, wave.surface, group.table, group.first)
-            clock.lap("surface at the hits", group.kind.name)
+                clock.lap("surface at the hits", group.kind.name)
         if recall is not None and self.lasting and not given:
             recall.note_rows(wave, n, self.lasting)
             clock.lap(*spared)
 
-    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, first: First | None) -> None:
+    def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, stale: Callable[[], bool],
+               first: First | None) -> None:
         clock = scratch.clock
         if not self.lamps:
             self.run(shading.glow, wave, n, self.look, NO_ANSWER)
@@ -317,7 +331,7 @@ class Tracer:
             if m == 0:
                 continue
             if self.plan.shadows:
-                known, blocked = self._shadows(clock, beam, [(lamp.key, *ends[j:j + 2]) for j, lamp in enumerate(lamps)], recall)
+                known, blocked = self._shadows(clock, beam, [(lamp.key, *ends[j:j + 2]) for j, lamp in enumerate(lamps)], stale, recall)
                 counts[SHADOW] += m - known
                 counts[SHADOW_HITS] -= blocked
             if first is not None and depth == 1 and len(first.film.lit):
@@ -333,7 +347,7 @@ class Tracer:
             depths = [recall and recall.reach(lamp.key) for lamp in self.lamps]
         return [Reach(UNTOLD if depth is None else depth, lit, scratch.target[:n], share) for depth in depths]
 
-    def _shadows(self, clock: Clock, beam: Beam, parts: list[tuple], recall: Recall | None) -> tuple[int, int]:
+    def _shadows(self, clock: Clock, beam: Beam, parts: list[tuple], stale, recall: Recall | None) -> tuple[int, int]:
         """What is in the way of a beam's rays, those of each light being a part (key, first column, one past the last). Returns of how many
         it was known, and how many of these reach no light."""
         m, known, blocked = parts[-1][2], 0, 0
@@ -344,6 +358,8 @@ class Tracer:
         for group in self.geometry.groups if known < m else ():
             self.run(group.kind.intersect, beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
             clock.lap("shadow rays", group.kind.name)
+            if stale():
+                raise Stale
         if recall is not None and known < m:
             for part in parts:
                 recall.note_shadows(beam, *part)

@@ -18,6 +18,7 @@ from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
+from rtcore.shapes._surface import find_kinds
 from rtcore.trace import CLOSEST, COUNTS
 from rtcore.wave import NO_ANSWER, SURFACE_ROWS, new_beam, new_rays, new_wave
 
@@ -36,8 +37,9 @@ def _look():
 def _core(dtype):
     wave, target, n = _wave(dtype)
     film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
-    films.note_first_hits(film, wave, n, target)
+    films.note_first_hits(film, wave, n, target, True)
     films.commit(film, sample, n, target)
+    find_kinds(wave.rays.prim, n, np.zeros(0, np.int64), np.zeros(0, bool))
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, np.zeros(0, np.int32), 8, 0, 8, 1, pixels, node, distance)
 
@@ -59,7 +61,7 @@ def _filter(dtype):
 def _glow(dtype):
     wave, _, n = _wave(dtype)
     shading.glow(wave, n, _look(), NO_ANSWER)
-    films.deposit(wave, n, np.zeros((3, 64), np.float32))
+    films.deposit(wave, n, np.zeros((3, 64), np.float32), True)
 
 
 def _doubt(dtype):

@@ -261,7 +261,7 @@ def test_a_stopped_render_goes_on_wherever_it_was_stopped():
             return left[0] < 0
         return tired
     while last is None or not last.done:
-        for frame in renderer.frames(request, patience(17 + 9 * stops)):
+        for frame in renderer.frames(request, patience(17 + 4 * stops)):
             last = frame
         stops += 1
     renderer.close()

@@ -19,7 +19,7 @@ def pace(**seconds) -> Pace:
 
 
 def test_nothing_known_means_the_coarsest_lattice_and_tiles_as_ever():
-    assert Pace().finest(10 ** 6, 2, 0.1, False) == COARSEST and Pace().edge() == TILE
+    assert Pace().finest(10 ** 6, 2, 0.1, False) == COARSEST and Pace().edge(1) == TILE
     assert Pace().finest(10 ** 6, 2, 0.1, True) == 1        # known hits are quick until they turn out not to be
 
 
@@ -41,7 +41,7 @@ def test_a_lattice_that_was_timed_tells_of_its_neighbours():
 
 @pytest.mark.parametrize("each", [1e-8, 1e-7, 1e-6, 1e-5])
 def test_a_tile_is_soon_over(each):
-    edge = pace(s1=each).edge()
+    edge = pace(s1=each).edge(1)
     assert edge ** 2 * each <= LONG and (edge == 2 * TILE or (2 * edge) ** 2 * each > LONG)
 
 
@@ -49,7 +49,7 @@ def test_a_tile_is_soon_over(each):
 def test_every_pixel_is_in_one_tile_of_one_lattice(first):
     size, seen = (150, 83), []
     for one in passes(True, first):
-        found = tiles(one, *size, 32)
+        found = tiles(one, *size, dict.fromkeys(LATTICES, 32))
         for x0, y0, columns, rows, spacing, skip, *_ in found:
             seen += [(x * spacing, y * spacing) for y in range(y0, y0 + rows) for x in range(x0, x0 + columns)
                      if not (skip and x % 2 == 0 and y % 2 == 0)]
