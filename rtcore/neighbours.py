@@ -41,6 +41,36 @@ def copy(tc, to, i, array, j):
     return types.void(to, types.intp, array, types.intp), gen
 
 
+def _by_turns(b, x, y):
+    """x0 y0 x1 y1 ... as two vectors."""
+    orders = [[LANES * (k % 2) + (part + k) // 2 for k in range(LANES)] for part in (0, LANES)]
+    return [b.shuffle_vector(x, y, ir.Constant(WHOLE, order)) for order in orders]
+
+
+@intrinsic
+def copy_twice(tc, to, i, array, j):
+    """to[i], to[i+1] = array[j], to[i+2], to[i+3] = array[j+1] and so on for eight of array; int32 arrays."""
+    def gen(ctx, b, sig, a):
+        p = b.bitcast(b.gep(ctx.make_array(array)(ctx, b, a[2]).data, [a[3]]), WHOLE.as_pointer())
+        numbers = b.load(p, align=4)
+        for part, value in enumerate(_by_turns(b, numbers, numbers)):
+            at = b.add(a[1], ir.IntType(64)(LANES * part))
+            b.store(value, place_of(ctx, b, sig, (a[0], at), I32, LANES), align=4)
+        return ctx.get_dummy_value()
+    return types.void(to, types.intp, array, types.intp), gen
+
+
+@intrinsic
+def store_by_turns(tc, array, row, i, x, y):
+    """array[row, i + 2k], array[row, i + 2k + 1] = x, y of lane k; array of the lanes' type."""
+    def gen(ctx, b, sig, a):
+        for part, value in enumerate(_by_turns(b, a[3], a[4])):
+            at = b.add(a[2], ir.IntType(64)(LANES * part))
+            b.store(value, place_of(ctx, b, sig, (a[0], a[1], at), REAL[x.elem], LANES), align=4)
+        return ctx.get_dummy_value()
+    return types.void(array, types.intp, types.intp, x, x), gen
+
+
 @intrinsic
 def load1(tc, array, i):
     """Eight floats array[i .. i+7]."""

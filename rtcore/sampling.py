@@ -85,6 +85,8 @@ def square(pixel, sample, dimension, seed):
 @inline
 def centered(pixel, sample, dimension, seed):
     """`square`, scrambled so that sample 0 lies in the middle."""
+    if sample == 0:
+        return 0.5, 0.5
     across, down = keys(pixel, sample, dimension, seed)
     x, y = _digits(sample // REPLICATES, across, down)
     if sample % REPLICATES == 0:    # flip the digits so that point 0 comes to 0.1000...: this is a nested scrambling too

@@ -12,7 +12,7 @@ from rtcore.indices import chosen, common_chosen, pick, pick3, rows_of
 from rtcore.jit import inline, kernel
 from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, load3, narrow, root, rounded, select, size, splat, store,
                           vec3, wide, with_sign, zero)
-from rtcore.neighbours import consecutive, copy, count_up, load1, store1
+from rtcore.neighbours import consecutive, copy, copy_twice, count_up, load1, store1, store_by_turns
 from rtcore.powers import floor
 from rtcore.latest import Latest
 from rtcore.scene import Background, Leaf, Material, invertible
@@ -236,6 +236,18 @@ def _take_all(child, i, made, carried, owner, parent):
 
 
 @inline
+def _take_both(child, i, made, carried, owner, parent):
+    """Rays i .. i+15 of the child wave: all sixteen noted, a reflected and a refracted one by turns."""
+    for k in range(6):
+        store_by_turns(child.rays.ray, k, i, load(made, k, 0), load(made, k, LANES))
+    for k in range(3):
+        store_by_turns(child.weight, k, i, load(carried, k, 0), load(carried, k, LANES))
+    copy_twice(child.owner, i, owner, parent)
+    count_up(child.source, i, 2 * parent, 1)
+    count_up(child.source, i + LANES, 2 * parent + LANES, 1)
+
+
+@inline
 def _start(rays, i):
     """Let rays i .. i+7 have met nothing yet."""
     none = zero(load(rays.ray, START, i))
@@ -301,6 +313,11 @@ def _onward(wave, i, hit, m, row, made, carried, child, total, counts):
         _take_all(child, total, made, carried, wave.owner, i)
         counts[REFLECTED] += LANES
         return total + LANES
+    if reflected & refracted == 255:
+        _take_both(child, total, made, carried, wave.owner, i)
+        counts[REFLECTED] += LANES
+        counts[REFRACTED] += LANES
+        return total + 2 * LANES
     todo = reflected | refracted
     while todo:
         lane = lowest_bit(todo)

@@ -4,7 +4,7 @@ import pytest
 
 from rtcore.jit import kernel
 from rtcore.lanes import load, store
-from rtcore.powers import power
+from rtcore.powers import decay, power
 
 
 @kernel
@@ -32,3 +32,17 @@ def test_powers_of_nought_and_one():
     out = np.empty((1, 8))
     powers(x, y, out)
     np.testing.assert_allclose(out, x ** y, rtol=1e-14)
+
+
+@kernel
+def decays(x, out):
+    for i in range(0, x.shape[1], 8):
+        store(out, 0, i, decay(load(x, 0, i)))
+
+
+def test_decay():
+    x = np.concatenate([[0, 1e-300, 700, 1e300, np.inf], 10 ** np.random.default_rng(2).uniform(-18, 2.8, 8003)])[None]
+    out = np.empty_like(x)
+    decays(x, out)
+    np.testing.assert_allclose(out, np.exp(-x), rtol=1e-13, atol=2.0 ** -1000)
+    assert out[0, 0] == 1 and out[0, 3] == out[0, 4] == 2.0 ** -1000

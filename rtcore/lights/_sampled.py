@@ -3,7 +3,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline
+from rtcore.jit import inline, inline_new
+from rtcore.lanes import LANES
 from rtcore.sampling import centered
 
 
@@ -16,8 +17,16 @@ class Draw(NamedTuple):
     seed: int
 
 
+@inline_new
+def new_draws():
+    """Room for the two numbers of eight rays."""
+    return np.zeros((2, LANES))
+
+
 @inline
-def drawn(wave, i, draw):
-    """Two numbers in 0 .. 1 for ray i of a wave; for a pixel's sample 0 they are the middle."""
-    primary = wave.owner[i]
-    return centered(draw.target[primary], draw.number[primary], draw.dimension, draw.seed)
+def draw_eight(room, wave, i, draw):
+    """Two numbers in 0 .. 1 for each of rays i .. i+7 of a wave that hits; for a pixel's sample 0 they are the middle."""
+    for lane in range(LANES):
+        if wave.rays.prim[i + lane] >= 0:
+            primary = wave.owner[i + lane]
+            room[0, lane], room[1, lane] = centered(draw.target[primary], draw.number[primary], draw.dimension, draw.seed)

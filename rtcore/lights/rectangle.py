@@ -6,11 +6,11 @@ import numpy as np
 
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import kernel
-from rtcore.lanes import LANES, load, load3, wide
-from rtcore.lights._sampled import drawn
-from rtcore.lights._shine import shine_on
+from rtcore.lanes import LANES, load, root, select, vec3
+from rtcore.lights._sampled import draw_eight, new_draws
+from rtcore.lights._shine import hit_points, shine_on
 from rtcore.scene import Light
-from rtcore.wave import DX, DY, DZ, PX, PY, PZ, T, finish
+from rtcore.wave import finish
 
 
 class RectangleLight(Light, frozen=True, kw_only=True):
@@ -40,26 +40,16 @@ class RectangleLight(Light, frozen=True, kw_only=True):
 def shine(wave, n, light, color, beam, first, reach, draw):
     """As that of a point light, toward places drawn evenly from the panel, each as strong as its distance and slant let it be. A ray ends a
     thousandth of an edge before the panel, so that a shape of the same size may show it."""
-    surface, ray, strength = wave.surface, beam.rays.ray, beam.bring
+    room = new_draws()
     for i in range(0, n, LANES):
-        for lane in range(LANES):
-            if wave.rays.prim[i + lane] < 0:
-                continue
-            at = first + lane       # the rays' own columns serve as room for the eight
-            u, v = drawn(wave, i + lane, draw)
-            u, v = u - 0.5, v - 0.5
-            x = light[0] + u * light[3] + v * light[6] - surface[PX, i + lane]
-            y = light[1] + u * light[4] + v * light[7] - surface[PY, i + lane]
-            z = light[2] + u * light[5] + v * light[8] - surface[PZ, i + lane]
-            height = -(x * light[9] + y * light[10] + z * light[11])     # of the hit before the panel's plane
-            if not height > 0:
-                strength[0, at] = 0
-                continue
-            square = x * x + y * y + z * z
-            ray[DX, at], ray[DY, at], ray[DZ, at] = x, y, z
-            ray[T, at] = 1 - light[12] / height
-            strength[0, at] = height / (square * np.sqrt(square))
-        way, end = wide(load3(ray, DX, first)), wide(load(ray, T, first))
-        first += shine_on(wave, i, beam, first, color, way, end, wide(load(strength, 0, first)), reach)
+        draw_eight(room, wave, i, draw)
+        hit, u, v = hit_points(wave, i), load(room, 0, 0) - 0.5, load(room, 1, 0) - 0.5
+        x = light[0] + u * light[3] + v * light[6] - hit.x
+        y = light[1] + u * light[4] + v * light[7] - hit.y
+        z = light[2] + u * light[5] + v * light[8] - hit.z
+        height = -(x * light[9] + y * light[10] + z * light[11])    # of the hit before the panel's plane
+        square = x * x + y * y + z * z
+        strength = select(height > 0, height / (square * root(square)), 0)
+        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 - light[12] / height, strength, reach)
     finish(beam.rays, first)
     return first

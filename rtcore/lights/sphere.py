@@ -5,12 +5,12 @@ import numpy as np
 
 from rtcore.fields import Number, Vec, Vector
 from rtcore.jit import kernel
-from rtcore.lanes import LANES, load, load3, wide
-from rtcore.lights._sampled import drawn
-from rtcore.lights._shine import shine_on
+from rtcore.lanes import LANES, greatest, load, root, select, vec3, zero
+from rtcore.lights._sampled import draw_eight, new_draws
+from rtcore.lights._shine import hit_points, shine_on
 from rtcore.sampling import disk
 from rtcore.scene import Light
-from rtcore.wave import DX, DY, DZ, PX, PY, PZ, T, finish
+from rtcore.wave import finish
 
 
 class SphereLight(Light, frozen=True, kw_only=True):
@@ -31,39 +31,30 @@ def shine(wave, n, light, color, beam, first, reach, draw):
     """As that of a point light, toward places of the ball, drawn evenly from the cone in which it is seen (Wang, "Physically Correct Direct
     Lighting for Distribution Ray Tracing", Graphics Gems III, 1992). A ray ends a thousandth of the radius before the ball, so that a
     shape of the same size may show it."""
-    surface, ray, strength, radius = wave.surface, beam.rays.ray, beam.bring, light[3]
+    room, radius = new_draws(), light[3]
     for i in range(0, n, LANES):
+        draw_eight(room, wave, i, draw)
         for lane in range(LANES):
-            if wave.rays.prim[i + lane] < 0:
-                continue
-            at = first + lane       # the rays' own columns serve as room for the eight
-            x = light[0] - surface[PX, i + lane]
-            y = light[1] - surface[PY, i + lane]
-            z = light[2] - surface[PZ, i + lane]
-            d = np.sqrt(x * x + y * y + z * z)
-            share = radius / d
-            share = share * share       # sin² of half the cone's angle
-            if not share < 1:
-                strength[0, at] = 0
-                continue
-            u, v = drawn(wave, i + lane, draw)
-            a, b = disk(u, v)
-            rest = np.sqrt(1 - share)
-            low = share / (1 + rest) * (a * a + b * b)      # 1 - cos of the angle off the axis
-            spread = np.sqrt(share / (1 + rest) * (2 - low))
-            sine = low * (2 - low)
-            x, y, z = x / d, y / d, z / d
-            # two directions across the axis: Duff and others, "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017
-            sign = 1.0 if z >= 0 else -1.0
-            p = -1 / (sign + z)
-            q = x * y * p
-            a, b = a * spread, b * spread
-            ray[DX, at] = (1 - low) * x + a * (1 + sign * x * x * p) + b * q
-            ray[DY, at] = (1 - low) * y + a * sign * q + b * (sign + y * y * p)
-            ray[DZ, at] = (1 - low) * z - a * sign * x - b * y
-            ray[T, at] = d * (1 - low - np.sqrt(max(share - sine, 0.0))) - radius * 2.0 ** -10
-            strength[0, at] = 2 / (d * d * (1 + rest))
-        way, end = wide(load3(ray, DX, first)), wide(load(ray, T, first))
-        first += shine_on(wave, i, beam, first, color, way, end, wide(load(strength, 0, first)), reach)
+            if wave.rays.prim[i + lane] >= 0:
+                room[0, lane], room[1, lane] = disk(room[0, lane], room[1, lane])
+        hit, a, b = hit_points(wave, i), load(room, 0, 0), load(room, 1, 0)
+        x, y, z = light[0] - hit.x, light[1] - hit.y, light[2] - hit.z
+        d = root(x * x + y * y + z * z)
+        share = radius / d
+        share = share * share       # sin² of half the cone's angle
+        rest = root(1 - share)
+        cap = share / (1 + rest)            # 1 - cos of that half
+        low = cap * (a * a + b * b)         # and of the angle off the axis
+        spread, sine = root(cap * (2 - low)), low * (2 - low)
+        x, y, z = x / d, y / d, z / d
+        # two directions across the axis: Duff and others, "Building an Orthonormal Basis, Revisited", JCGT 6(1), 2017
+        sign = select(z >= 0, 1, zero(z) - 1)
+        p = -1 / (sign + z)
+        q = x * y * p
+        a, b = a * spread, b * spread
+        way = vec3((1 - low) * x + a * (1 + sign * x * x * p) + b * q, (1 - low) * y + a * sign * q + b * (sign + y * y * p),
+                   (1 - low) * z - a * sign * x - b * y)
+        end = d * (1 - low - root(greatest(share - sine, 0))) - radius * 2.0 ** -10
+        first += shine_on(wave, i, beam, first, color, way, end, select(share < 1, 2 / (d * d * (1 + rest)), 0), reach)
     finish(beam.rays, first)
     return first

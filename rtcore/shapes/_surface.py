@@ -104,13 +104,18 @@ def put_globe(out, i, ok, room, v):
 
 @inline
 def put_flats(rays, i, ok, out, data, q, column):
-    """Surface rows of hits on planes through data[q, 0..2] with normals data[q, column..]; texture coordinates along the two axes that
-    the normal points at least."""
+    """Surface rows of hits on planes through data[q, 0..2] with normals data[q, column..]."""
     c, n = pick3(data, q, 0), normalized(pick3(data, q, column))
     s = hits_from(rays, i, c)
     height = s.x * n.x + s.y * n.y + s.z * n.z
     s = vec3(s.x - height * n.x, s.y - height * n.y, s.z - height * n.z)
     put_surfaces(out, i, ok, c + s, n, extent_of(c))
+    put_flat_coordinates(out, i, ok, s, n)
+
+
+@inline
+def put_flat_coordinates(out, i, ok, s, n):
+    """Texture coordinates of points s on planes with normals n: along the two axes that the normal points at least."""
     x, y, z = size(n.x), size(n.y), size(n.z)
     along_x, along_y = (x >= y) & (x >= z), y >= z
     put_coordinates(out, i, ok, select(along_x, s.y, select(along_y, s.z, s.x)), select(along_x, s.z, select(along_y, s.x, s.y)))

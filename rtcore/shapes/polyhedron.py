@@ -7,15 +7,18 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.across import lowest_bit
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import dot as product, moved, parts, rationals, turned
 from rtcore.fields import Field, FieldError, Vec, Vector
+from rtcore.indices import among
 from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, dot, greatest, least, load, load3, rounded, select, size, splat3, wide
+from rtcore.lanes import LANES, any_lane, bits, dot, greatest, least, load, load3, rounded, select, size, splat3, vec3, wide, zero
 from rtcore.pairs import add, divide, multiply, two_sum
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U64, extent as length
-from rtcore.shapes.kind import FRONT, Kind, Packed, hit_from, put_surface
+from rtcore.shapes._surface import extent_of, hits_from, put_flat_coordinates, put_surfaces
+from rtcore.shapes.kind import FRONT, Kind, Packed
 from rtcore.wave import DX, OX, START, alive, record, until
 
 MOST_PLANES = 64
@@ -226,24 +229,33 @@ def intersect_open(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    data, extra = table.data, table.extra
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            cx, cy, cz = table.exact[q, 0], table.exact[q, 1], table.exact[q, 2]
-            x, y, z = hit_from(rays, i, cx, cy, cz)
-            # the face is the plane that the point is nearest to; the point is put onto it
-            best, off, reach = 0, -np.inf, 0.0
-            for k in range(int(data[q, FIRST]), int(data[q, FIRST] + data[q, COUNT])):
-                h = (extra[k, 0] * x + extra[k, 1] * y + extra[k, 2] * z - extra[k, HEIGHT]) * extra[k, INVERSE]
-                reach = max(reach, abs(extra[k, HEIGHT] * extra[k, INVERSE]))
-                if h > off:
-                    best, off = k, h
-            nx, ny, nz = extra[best, 0] * extra[best, INVERSE], extra[best, 1] * extra[best, INVERSE], extra[best, 2] * extra[best, INVERSE]
-            x, y, z = x - off * nx, y - off * ny, z - off * nz
-            u, v = (y, z) if abs(nx) >= max(abs(ny), abs(nz)) else (z, x) if abs(ny) >= abs(nz) else (x, y)
-            put_surface(out, i, cx + x, cy + y, cz + z, nx, ny, nz, u, v, max(abs(cx), max(abs(cy), abs(cz))) + reach)
+    prim, last = rays.prim, first + table.data.shape[0]
+    for i in range(0, n, LANES):
+        todo = bits(among(prim, i, first, last))
+        while todo:     # one polyhedron after the other, for they have different numbers of planes
+            q = prim[i + lowest_bit(todo)] - first
+            mine = among(prim, i, first + q, first + q + 1)
+            todo &= ~bits(mine)
+            _put_faces(rays, i, mine, out, table.data, table.extra, table.exact, q)
+
+
+@inline
+def _put_faces(rays, i, mine, out, data, extra, exact, q):
+    """Surface rows of hits on polyhedron q. The face is the one whose plane the point is nearest to; the point is put onto it."""
+    center = splat3(exact, q, 0)
+    p = hits_from(rays, i, center)
+    off, x, y, z, reach = zero(p.x) - np.inf, zero(p.x), zero(p.x), zero(p.x), 0.0
+    for k in range(int(data[q, FIRST]), int(data[q, FIRST] + data[q, COUNT])):
+        over = extra[k, INVERSE]
+        height = (p.x * extra[k, 0] + p.y * extra[k, 1] + p.z * extra[k, 2] - extra[k, HEIGHT]) * over
+        reach = max(reach, abs(extra[k, HEIGHT] * over))
+        nearer = height > off
+        off = select(nearer, height, off)
+        x, y, z = select(nearer, extra[k, 0] * over, x), select(nearer, extra[k, 1] * over, y), select(nearer, extra[k, 2] * over, z)
+    normal = vec3(x, y, z)
+    p = p - normal * off
+    put_surfaces(out, i, mine, center + p, normal, extent_of(center) + reach)
+    put_flat_coordinates(out, i, mine, p, normal)
 
 
 def _bounds(data, extra):

@@ -13,14 +13,16 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
-from rtcore.jit import kernel
-from rtcore.lanes import any_lane, bits
+from rtcore.indices import among, common, pick, pick3, rows_of
+from rtcore.jit import inline, kernel
+from rtcore.lanes import LANES, any_lane, bits, select, size, vec3
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, approach, may_meet, meet, settle
 from rtcore.shapes._unit import INTO
-from rtcore.shapes.kind import OWN, Kind, Packed, around, forward, normalized, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import alive, record
+from rtcore.shapes._surface import angles, new_room, normalized, put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes.kind import OWN, Kind, Packed, forward, placed, placed_bounds
+from rtcore.wave import U, alive, record
 
 #: Columns after the placing: the form, the box's corners, the largest number of L, that of the form's second-degree part.
 LOW, HIGH, MOST = OWN + 10, OWN + 13, OWN + 16
@@ -121,25 +123,36 @@ def intersect_open(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    data = table.data
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            x, y, z = unit_hit(rays, i, data, q)
-            k = OWN
-            gx, gy, gz = 0.0, 0.0, 0.0
-            for _ in range(2):      # the point is brought onto the surface along the gradient
-                gx = 2 * data[q, k] * x + data[q, k + 3] * y + data[q, k + 4] * z + data[q, k + 6]
-                gy = data[q, k + 3] * x + 2 * data[q, k + 1] * y + data[q, k + 5] * z + data[q, k + 7]
-                gz = data[q, k + 4] * x + data[q, k + 5] * y + 2 * data[q, k + 2] * z + data[q, k + 8]
-                value = 0.5 * (x * (gx + data[q, k + 6]) + y * (gy + data[q, k + 7]) + z * (gz + data[q, k + 8])) + data[q, k + 9]
-                square = gx * gx + gy * gy + gz * gz
-                # at an apex the gradient vanishes, and a step along it would lead far away
-                step = value / square if square > 1e-12 and abs(value) < 0.01 * square else 0.0
-                x, y, z = x - step * gx, y - step * gy, z - step * gz
-            nx, ny, nz = normalized(gx, gy, gz)
-            put_placed(out, i, data, q, x, y, z, nx, ny, nz, around(out, y, x), z)
+    prim, data, room = rays.prim, table.data, new_room()
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                _put_quadrics(rays, i, ok, out, data, row, room)
+            else:
+                _put_quadrics(rays, i, ok, out, data, rows, room)
+
+
+@inline
+def _put_quadrics(rays, i, ok, out, data, q, room):
+    """Surface rows of hits on quadrics q."""
+    p, square, mixed, linear = unit_hits(rays, i, data, q), pick3(data, q, OWN), pick3(data, q, OWN + 3), pick3(data, q, OWN + 6)
+    slope = p
+    for _ in range(2):      # the point is brought onto the surface along the gradient
+        slope = vec3(2 * square.x * p.x + mixed.x * p.y + mixed.y * p.z + linear.x,
+                     mixed.x * p.x + 2 * square.y * p.y + mixed.z * p.z + linear.y,
+                     mixed.y * p.x + mixed.z * p.y + 2 * square.z * p.z + linear.z)
+        both = slope + linear
+        value = 0.5 * (p.x * both.x + p.y * both.y + p.z * both.z) + pick(data, q, OWN + 9)
+        steep = slope.x * slope.x + slope.y * slope.y + slope.z * slope.z
+        # at an apex the gradient vanishes, and a step along it would lead far away
+        step = select((steep > 1e-12) & (size(value) < 0.01 * steep), value / steep, 0)
+        p = p - slope * step
+    put_all_placed(out, i, ok, data, q, p, normalized(slope))
+    if out.shape[0] > U:
+        put_coordinates(out, i, ok, angles(room, p.y, p.x), p.z)
 
 
 def _bounds(data, extra):

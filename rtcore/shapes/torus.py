@@ -7,14 +7,16 @@ import numpy as np
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Number
+from rtcore.indices import among, common, pick, rows_of
 from rtcore.jit import inline, kernel
-from rtcore.lanes import any_lane, bits, dot, load, load3, root, rounded, size, splat3, wide
+from rtcore.lanes import LANES, any_lane, bits, dot, load, load3, root, rounded, select, size, splat3, vec3, wide, zero
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet
 from rtcore.shapes._torus import CONSTANTS, RADII, first_root, isolate, may_cross, settle
 from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
-from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, around, forward, into, placed, placed_bounds, put_placed, unit_hit
-from rtcore.wave import DX, OX, START, T, record, until
+from rtcore.shapes._surface import angles, new_room, normalized, put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, forward, into, placed, placed_bounds
+from rtcore.wave import DX, OX, START, T, U, record, until
 
 MAJOR, MINOR, MOST = OWN, OWN + 1, OWN + 2      # the radii in the unit shape's lengths; the largest number of the matrix L into it
 
@@ -112,26 +114,31 @@ def intersect(rays, n, tree, table, first, opacity):
 
 @kernel
 def surface(rays, n, out, table, first):
-    last = first + table.data.shape[0]
-    data = table.data
-    for i in range(n):
-        if first <= rays.prim[i] < last:
-            q = rays.prim[i] - first
-            x, y, z = unit_hit(rays, i, data, q)
-            major, minor = np.float64(data[q, MAJOR]), np.float64(data[q, MINOR])
-            off = np.sqrt(x * x + y * y)
-            cx, cy = (x / off * major, y / off * major) if off > 0 else (major, 0.0)
-            out_ = 1.0
-            if abs((off + major) ** 2 + z * z - minor * minor) < abs((off - major) ** 2 + z * z - minor * minor):
-                cx, cy, out_ = -cx, -cy, -1.0       # the inner skin of a spindle
-            nx, ny, nz = x - cx, y - cy, z
-            length = np.sqrt(nx * nx + ny * ny + nz * nz)
-            if length > 0:
-                nx, ny, nz = nx / length, ny / length, nz / length
+    prim, data, room = rays.prim, table.data, new_room()
+    for i in range(0, n, LANES):
+        ok = among(prim, i, first, first + data.shape[0])
+        if any_lane(ok):
+            rows = rows_of(prim, i, first, ok)
+            row = common(rows)
+            if row >= 0:
+                _put_tori(rays, i, ok, out, data, row, room)
             else:
-                nx, ny, nz = 0.0, 0.0, 1.0
-            u, v = around(out, y, x), around(out, z, off - major)
-            put_placed(out, i, data, q, cx + minor * nx, cy + minor * ny, minor * nz, out_ * nx, out_ * ny, out_ * nz, u, v)
+                _put_tori(rays, i, ok, out, data, rows, room)
+
+
+@inline
+def _put_tori(rays, i, ok, out, data, q, room):
+    """Surface rows of hits on tori q."""
+    p, major, minor = unit_hits(rays, i, data, q), pick(data, q, MAJOR), pick(data, q, MINOR)
+    off, height = root(p.x * p.x + p.y * p.y), p.z * p.z - minor * minor
+    inner = size((off + major) * (off + major) + height) < size((off - major) * (off - major) + height)     # the skin within a spindle
+    side = select(inner, -1, 1 + zero(off))
+    x, y = select(off > 0, p.x / off * major, major) * side, select(off > 0, p.y / off * major, 0) * side
+    normal = normalized(vec3(p.x - x, p.y - y, p.z))
+    put_all_placed(out, i, ok, data, q, vec3(x + minor * normal.x, y + minor * normal.y, minor * normal.z), normal * side)
+    if out.shape[0] > U:
+        around = angles(room, p.y, p.x)
+        put_coordinates(out, i, ok, around, angles(room, p.z, off - major))
 
 
 def _bounds(data, extra):
