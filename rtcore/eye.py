@@ -1,11 +1,11 @@
 """Primary rays: a tile of the picture, of a coarse lattice over it, or a list of pixels, as a wave."""
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.jit import inline, inline_new, kernel
 from rtcore.lanes import LANES, fill, load, rounded, splat, store, vec3, zero
 from rtcore.neighbours import count_up
 from rtcore.sampling import jitter
-from rtcore.shapes._surface import normalized
 from rtcore.wave import DX, OX, START, T, finish
 
 
@@ -22,10 +22,19 @@ def _put(wave, n, target, places, pixel, x, y):
     target[n] = pixel
 
 
+@inline_new
+def _new_numbers():
+    """0 .. 7."""
+    made = np.zeros((1, LANES))
+    for lane in range(LANES):
+        made[0, lane] = lane
+    return made
+
+
 @inline
-def _aim(wave, n, places, view):
-    """Primary rays n .. n+7 through their places."""
-    ray, u, v = wave.rays.ray, load(places, 0, 0), load(places, 1, 0)
+def _aim(wave, n, u, v, view):
+    """Primary rays n .. n+7 through the places (u, v) of the picture, in pixels from the top left."""
+    ray = wave.rays.ray
     d = normalized(vec3(view[1, 0] + u * view[2, 0] + v * view[3, 0], view[1, 1] + u * view[2, 1] + v * view[3, 1],
                         view[1, 2] + u * view[2, 2] + v * view[3, 2]))
     like = load(ray, OX, n)
@@ -53,13 +62,20 @@ def cast(wave, target, view, tile, sample, seed):
     of the picture. Rays run through blocks of 8 x 8 pixels, so that a packet is a compact bundle.
     """
     x0, y0, columns, rows, spacing, skip, width, height = tile
-    n, places = 0, _new_places()
+    n, places, lanes = 0, _new_places(), load(_new_numbers(), 0, 0)
     for by in range(0, rows, 8):
         for bx in range(0, columns, 8):
             # whole rows before those with gaps: eight neighbours are noted in the film at once
             for gaps in range(1 + skip):
                 for j in range(by, min(by + 8, rows)):
                     if skip and (y0 + j) % 2 == gaps:
+                        continue
+                    x, y = (x0 + bx) * spacing, (y0 + j) * spacing
+                    if sample == 0 and not gaps and n & 7 == 0 and bx + 8 <= columns and x + 7 * spacing < width and y < height:
+                        # the centres of eight pixels in a row
+                        count_up(target, n, y * width + x, spacing)
+                        _aim(wave, n, lanes * spacing + (x + 0.5), zero(lanes) + (y + 0.5), view)
+                        n += 8
                         continue
                     for i in range(bx, min(bx + 8, columns)):
                         x, y = (x0 + i) * spacing, (y0 + j) * spacing
@@ -69,9 +85,9 @@ def cast(wave, target, view, tile, sample, seed):
                         _put(wave, n, target, places, y * width + x, u + x, v + y)
                         n += 1
                         if n & 7 == 0:
-                            _aim(wave, n - 8, places, view)
+                            _aim(wave, n - 8, load(places, 0, 0), load(places, 1, 0), view)
     if n & 7:
-        _aim(wave, n & -8, places, view)
+        _aim(wave, n & -8, load(places, 0, 0), load(places, 1, 0), view)
     finish(wave.rays, n)
     return n
 
@@ -88,8 +104,8 @@ def cast_list(wave, target, view, width, pixels, seed):
             _put(wave, n, target, places, pixel, u + x, v + y)
             n += 1
             if n & 7 == 0:
-                _aim(wave, n - 8, places, view)
+                _aim(wave, n - 8, load(places, 0, 0), load(places, 1, 0), view)
     if n & 7:
-        _aim(wave, n & -8, places, view)
+        _aim(wave, n & -8, load(places, 0, 0), load(places, 1, 0), view)
     finish(wave.rays, n)
     return n

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.across import count, lowest_bit
+from rtcore.directions import normalized
 from rtcore.indices import chosen, common_chosen, pick, pick3, rows_of
 from rtcore.jit import inline, kernel
 from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, load3, narrow, root, rounded, select, size, splat, store,
@@ -16,7 +17,6 @@ from rtcore.neighbours import consecutive, copy, copy_twice, count_up, load1, st
 from rtcore.powers import floor
 from rtcore.latest import Latest
 from rtcore.scene import Background, Leaf, Material, invertible
-from rtcore.shapes._surface import normalized
 from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
 
 # columns of Look.material
@@ -123,19 +123,19 @@ def glow(wave, n, look, answer):
             met = rows_of(prim, i, 0, hit)
             row = common_chosen(of, met)
             if row >= 0:
-                seen = select(hit, _own(wave.surface, i, look, row, answer), seen)
+                seen = select(hit, _own(wave, i, look, row, answer), seen)
             else:
-                seen = select(hit, _own(wave.surface, i, look, chosen(of, met), answer), seen)
+                seen = select(hit, _own(wave, i, look, chosen(of, met), answer), seen)
         store(light, 0, i, narrow(seen.x))
         store(light, 1, i, narrow(seen.y))
         store(light, 2, i, narrow(seen.z))
 
 
 @inline
-def _own(surface, i, look, row, answer):
+def _own(wave, i, look, row, answer):
     """What hits i .. i+7 send out by themselves; how they answer lights is noted if there is room. row: their materials', as for `pick`."""
     m, ambient = look.material, look.ambient
-    color, own, share = _colors(m, row, surface, i), pick3(m, row, EMISSION), pick(m, row, AMBIENT)
+    color, own, share = _colors(m, row, wave.surface, i), pick3(m, row, EMISSION), pick(m, row, AMBIENT)
     if answer.shape[1] > 0:
         diffuse = pick(m, row, DIFFUSE)
         store(answer, 0, i, narrow(diffuse * color.x))

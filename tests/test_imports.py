@@ -18,8 +18,8 @@ LAYERS = (
     {"rtcore.camera"},
     {"rtcore.scene"},
     {"rtcore.latest"},
-    {"rtcore.across", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.jit", "rtcore.lanes", "rtcore.neighbours",
-     "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},
+    {"rtcore.across", "rtcore.directions", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.jit", "rtcore.lanes",
+     "rtcore.neighbours", "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},
     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.bvh", "rtcore.pyramid", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},

@@ -31,8 +31,8 @@ CASES = [pytest.param(shape, least, precision, id=f"{type(shape).__name__}-{prec
 
 #: The same of what else a picture goes through, and how many on single numbers there may be: films have a way for pixels apart, spheres
 #: one for the angles of texture coordinates.
-STAGES = {eye.cast: (38, 20), film.deposit: (4, 30), film.commit: (15, 30), shading.glow: (33, 8), shading.gather: (2, 32),
-          shading.bounce: (110, 4), point.shine: (90, 4), sphere.surface: (28, 70), triangle.surface: (110, 4)}
+STAGES = {eye.cast: (80, 24), film.deposit: (16, 24), film.commit: (16, 90), shading.glow: (75, 6), shading.gather: (2, 32),
+          shading.bounce: (250, 4), point.shine: (110, 16), sphere.surface: (70, 70), triangle.surface: (240, 16)}
 
 
 def afresh(cached, precision: str) -> tuple[str, str, str]:

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.across import lowest_bit
+from rtcore.directions import normalized
 from rtcore.indices import among
 from rtcore.jit import inline
 from rtcore.lanes import (LANES, any_lane, bits, dot, exceeds, fill, greatest, load, load3, narrow, rounded, select, store,
                           wide, zero)
 from rtcore.neighbours import consecutive, load1, store1
 from rtcore.powers import power
-from rtcore.shapes._surface import normalized
 from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, RAY_ROWS, START, T
 
 

@@ -2,9 +2,10 @@
 anything; only those of the mask are written."""
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.indices import among, pick, pick3, put, put3
 from rtcore.jit import inline, inline_new, kernel
-from rtcore.lanes import LANES, any_lane, bits, greatest, load, load3, root, select, size, store, vec3, wide
+from rtcore.lanes import LANES, any_lane, greatest, load, load3, select, size, store, vec3, wide
 from rtcore.shapes.kind import REACH
 from rtcore.wave import DX, ERR, GX, NX, OX, PX, T, U, V
 
@@ -18,28 +19,6 @@ def find_kinds(prim, n, ends, found):
             if any_lane(among(prim, i, first, ends[k])):
                 found[k] = True
                 break
-
-
-@inline
-def normalized(v):
-    """A vector at length 1, without overflow or underflow; the zero vector becomes z."""
-    square = v.x * v.x + v.y * v.y + v.z * v.z
-    over = 1 / root(square)
-    ordinary = (square > 1e-280) & (square < 1e280)
-    made = vec3(v.x * over, v.y * over, v.z * over)
-    if bits(ordinary) != 255:       # what becomes of a lane must not hang on the others
-        made = select(ordinary, made, _normalized_slowly(v))
-    return made
-
-
-@inline
-def _normalized_slowly(v):
-    """The same for any vector: seven divisions and roots in place of two, which were half the time of casting eye rays."""
-    most = greatest(size(v.x), greatest(size(v.y), size(v.z)))
-    x, y, z = v.x / most, v.y / most, v.z / most
-    length = root(x * x + y * y + z * z)
-    some = most > 0
-    return vec3(select(some, x / length, 0), select(some, y / length, 0), select(some, z / length, 1))
 
 
 @inline

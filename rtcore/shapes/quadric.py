@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
@@ -20,7 +21,7 @@ from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
 from rtcore.shapes._second import BOX, EVERYWHERE, FORM, IN_BOX, approach, may_meet, meet, settle
 from rtcore.shapes._unit import INTO
-from rtcore.shapes._surface import angles, new_room, normalized, put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes._surface import angles, new_room, put_all_placed, put_coordinates, unit_hits
 from rtcore.shapes.kind import OWN, Kind, Packed, forward, placed, placed_bounds
 from rtcore.wave import U, alive, record
 

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.expansions import LONG, expand, noise_of
@@ -21,7 +22,7 @@ from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
 from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs, noise_here
-from rtcore.shapes._surface import extent_of, hits_from, new_room, normalized, put_all_placed, put_globe, put_surfaces, unit_hits
+from rtcore.shapes._surface import extent_of, hits_from, new_room, put_all_placed, put_globe, put_surfaces, unit_hits
 from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, forward, into, placed, placed_bounds, power_near
 from rtcore.wave import DX, OX, START, T, alive, record, until
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Number
@@ -14,7 +15,7 @@ from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import U32, U64, closest, extent, lowest, may_meet
 from rtcore.shapes._torus import CONSTANTS, RADII, first_root, isolate, may_cross, settle
 from rtcore.shapes._unit import PLACE, into_plain, line_in_pairs
-from rtcore.shapes._surface import angles, new_room, normalized, put_all_placed, put_coordinates, unit_hits
+from rtcore.shapes._surface import angles, new_room, put_all_placed, put_coordinates, unit_hits
 from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, forward, into, placed, placed_bounds
 from rtcore.wave import DX, OX, START, T, U, record, until
 

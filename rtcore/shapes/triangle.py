@@ -7,6 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
 from rtcore.across import lowest_bit
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
@@ -16,7 +17,7 @@ from rtcore.lanes import LANES, any_lane, bits, fma, greatest, least, load, load
 from rtcore.powers import exponent, power_of_two
 from rtcore.scene import Shape, invertible
 from rtcore.shapes._ball import lowest
-from rtcore.shapes._surface import extent_of, hits_from, normalized, put_coordinates, put_surfaces
+from rtcore.shapes._surface import extent_of, hits_from, put_coordinates, put_surfaces
 from rtcore.shapes.kind import BACK, FRONT, MIRRORED, Kind, Packed
 from rtcore.wave import DX, NX, OX, SLOW, record, record_one
 
