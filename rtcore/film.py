@@ -13,7 +13,7 @@ import numpy as np
 
 from rtcore.across import count
 from rtcore.jit import inline, kernel
-from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, splat, store, wide
+from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, store, wide
 from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, store1, store_triples, turns
 from rtcore.sampling import REPLICATES
 from rtcore.wave import DEPTH_UNIT, NX, T
@@ -56,24 +56,18 @@ def suits(film: Film, samples: int, lit: bool, signed: bool) -> bool:
 def clear(film: Film) -> None:
     """Let it be a new film. What is left of the old one is not looked at where there is no sample, and the first one replaces it."""
     film.count.fill(0)
+    film.lit.fill(0)
 
 
 @kernel
-def note_first_hits(film, wave, n, target, anew):
-    """Which primitive each primary ray hit, how far away, and the normal there, without a doubt, if that is to be noted anew; and that no
-    light has reached it so far."""
+def note_first_hits(film, wave, n, target):
+    """Which primitive each primary ray hit, how far away, and the normal there, without a doubt."""
     for i in range(0, n, LANES):
         if i + LANES <= n and consecutive(target, i):
-            if anew:
-                _note_eight(film, target[i], wave.rays, wave.surface, i)
-            if film.lit.shape[0] > 0:
-                store1(film.lit, target[i], splat(np.float32(0)))
+            _note_eight(film, target[i], wave.rays, wave.surface, i)
             continue
         for j in range(i, min(i + LANES, n)):
-            if anew:
-                _note_one(film, target[j], wave.rays, wave.surface, j)
-            if film.lit.shape[0] > 0:
-                film.lit[target[j]] = 0
+            _note_one(film, target[j], wave.rays, wave.surface, j)
 
 
 @inline

@@ -66,6 +66,7 @@ class Level:
         self.noted = False                          # the film has noted them
         self.shades: dict[tuple, Shade] = {}        # by what makes a light's shadows
         self.rows: Rows | None = None               # of hits on kinds whose rows take long
+        self.found: list[bool] | None = None        # which kinds are hit
 
     @property
     def told(self) -> Known:
@@ -181,6 +182,20 @@ def _put_rows(surface, at, rows):
 
 
 @kernel
+def _put_moved(surface, was, at, rows, place):
+    """The same for columns that were those in `was`, int32. place: room for as many int32 as there were columns."""
+    for i in range(len(place)):
+        place[i] = -1
+    for j in range(len(at)):
+        place[at[j]] = j
+    for i in range(len(was)):
+        j = place[was[i]]
+        if j >= 0:
+            for r in range(rows.shape[0]):
+                surface[r, i] = rows[r, j]
+
+
+@kernel
 def _renumber(prim, doubt, number):
     """Primitives by their new numbers, UNKNOWN for those that are gone, and for hits without a proof, which hang on what else the search
     had met; returns whether there are such."""
@@ -255,7 +270,7 @@ class Memory:
         for levels in self.tiles.values():
             for level in levels:
                 if moved or level.doubt.any():
-                    level.noted = False
+                    level.noted, level.found = False, None
                     level.whole &= not _renumber(level.prim, level.doubt, number)
                 if len(boxes):
                     level.boxes = np.concatenate([level.boxes, boxes])
@@ -279,6 +294,7 @@ class Recall:
         self.levels: list[Level] = []
         self.grown = False                      # something is known that was not
         self._was: np.ndarray | None = None     # the kept column of each ray of the wave at hand, -1 unknown; None: its own
+        self._unknown = 0                       # how many there are
 
     def hits(self, wave: Wave, n: int) -> Known:
         """Give the rays of the next wave the hits that are known."""
@@ -290,12 +306,14 @@ class Recall:
             self._was = self._matched(old, source)
         if self._was is None and old.whole and not len(old.boxes):
             _recall_all(wave.rays, old.prim, old.t, old.doubt)
+            self._unknown = 0
             return old.told
         wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
         known = np.zeros(4, np.int64)
         if old is not None:
             self._was = np.arange(n, dtype=np.int32) if self._was is None else self._was
             _recall(wave.rays, self._was, old.prim, old.t, old.doubt, old.source, old.boxes, known)
+        self._unknown = n - int(known[0])
         return Known(*map(int, known))
 
     def _matched(self, old: Level, source: np.ndarray) -> np.ndarray | None:
@@ -312,29 +330,36 @@ class Recall:
         if self._was is None:       # all of it was known
             self.levels.append(self._kept[depth])
             return
-        if depth < len(self._kept):     # kernels that can doubt have begun anew, for known rays too
-            rays.doubt[:n] = np.where(self._was < 0, rays.doubt[:n], self._kept[depth].doubt[self._was])
-        self.grown = True
+        old = self._kept[depth] if depth < len(self._kept) else None
+        if old is not None:     # kernels that can doubt have begun anew, for known rays too
+            rays.doubt[:n] = np.where(self._was < 0, rays.doubt[:n], old.doubt[self._was])
+        # a wave that is a part of the kept one: what is kept tells more, and the next edit may ask for it
+        self.grown |= old is None or not old.whole or len(old.boxes) > 0 or self._unknown > 0
         level = Level(np.zeros(n, np.int32) if depth == 0 else wave.source[:n].copy(), rays.prim[:n].copy(), rays.ray[T, :n].copy(),
                       rays.doubt[:n].copy())
-        if depth < len(self._kept):
-            for key, (kept, boxes) in self._kept[depth].shades.items():
+        if old is not None:
+            for key, (kept, boxes) in old.shades.items():
                 level.shades[key] = Shade(_whole(np.where(self._was < 0, UNSEEN, kept[self._was])), boxes)
         self.levels.append(level)
 
     def rows(self, wave: Wave) -> bool:
         """Give the wave the surface rows that are known of kinds whose rows take long; False if they are not, all of them."""
-        rows = self.levels[-1].rows
-        if self._was is not None or rows is None:
+        depth = len(self.levels) - 1
+        old = self._kept[depth] if depth < len(self._kept) else None
+        if old is None or old.rows is None:
             return False
-        _put_rows(wave.surface, *rows)
+        if self._was is None:
+            _put_rows(wave.surface, *old.rows)
+        elif self._unknown:
+            return False
+        else:
+            _put_moved(wave.surface, self._was, *old.rows, np.empty(len(old.prim), np.int32))
         return True
 
     def note_rows(self, wave: Wave, n: int, spans: Iterable[tuple[int, int]]) -> None:
         """The wave has them now; spans: first and one past the last of the primitives of each such kind."""
         prim = wave.rays.prim[:n]
         at = np.concatenate([np.flatnonzero((first <= prim) & (prim < last)) for first, last in spans]).astype(np.int32)
-        self.grown = True
         self.levels[-1].rows = rows = Rows(at, np.empty((len(wave.surface), len(at)), wave.surface.dtype))
         _take_rows(wave.surface, *rows)
 

@@ -3,9 +3,9 @@ import math
 
 from rtcore.schedule import COARSEST, LATTICES, TILE
 
-EDGES = (2 * TILE, TILE, TILE // 2, TILE // 4)
+EDGES = (3 * TILE, 2 * TILE, TILE, TILE // 2, TILE // 4)
 SPARSE = {16: TILE // 2, 8: TILE // 2, 4: TILE}     # edges, by the spacing, at which a lattice still is enough tiles for several threads
-LONG = 0.012        # seconds that a tile may take: then its thread sees that it is not wanted any more
+LONG = 0.03         # seconds that a tile may take; that it is not wanted any more its thread sees after each kind of shapes
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
 
 

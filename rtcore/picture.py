@@ -19,7 +19,7 @@ from rtcore.pace import Pace
 from rtcore.plan import VIEW, Plan
 from rtcore.recast import Recast
 from rtcore.scene import Scene
-from rtcore.schedule import COARSEST, Pass, further, passes, tile_order, tiles, weight
+from rtcore.schedule import COARSEST, FURTHER, TILE, Pass, further, passes, tile_order, tiles, weight
 from rtcore.settings import Settings
 from rtcore.trace import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW, Scratch, Tracer
 from rtcore.views.view import Seen
@@ -65,7 +65,7 @@ class Start(NamedTuple):
     memory: Memory | None       # what is known of its first samples
     coarse: bool                # lattice by lattice
     first: int                  # spacing of the finest one in the first pass
-    edges: dict[int, int]       # of the tiles, in lattice points, by the lattice's spacing, as far as they are chosen
+    edges: dict[int, int]       # of the tiles, as far as they are chosen: see `schedule.tiles`
     soon: float                 # seconds after which the first pass shows what it has
     goes_on: bool               # the samples of the one before are its own
     threads: int
@@ -157,8 +157,12 @@ class Render:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
         a thread, ends the threads' work first."""
         one, size = self.schedule[self.number], self.settings.size
-        for spacing in (*one.coarser, one.spacing):
-            self.edges.setdefault(spacing, self.pace.edge(spacing))
+        if one.samples == range(1):
+            for spacing in (*one.coarser, one.spacing):
+                self.edges.setdefault(spacing, self.pace.edge(spacing))
+        else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, and never larger
+            edge = self.edges.get(FURTHER, self.edges[1])
+            self.edges[FURTHER] = min(edge, TILE) if one.region else edge
         queue = tiles(one, *size, self.edges)
         share = weight(one, *size)
         each = share / max(len(queue), 1)

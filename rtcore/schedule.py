@@ -7,7 +7,8 @@ import numpy as np
 LATTICES = (16, 8, 4, 2, 1)     # their spacings
 COARSEST = LATTICES[0]
 TILE = 64           # lattice points along a tile's edge: 4,096 rays, some milliseconds
-EVEN = dict.fromkeys(LATTICES, TILE)
+FURTHER = 0         # in place of a spacing: samples beyond the first
+EVEN = dict.fromkeys((*LATTICES, FURTHER), TILE)
 BLOCK = 8           # pixels along the edge of what is traced together
 
 
@@ -51,15 +52,16 @@ def weight(one: Pass, width: int, height: int) -> float:
 
 def tiles(one: Pass, width: int, height: int, edges: Mapping[int, int] = EVEN) -> list[np.ndarray]:
     """What the threads take one after the other: tiles as `eye.cast` takes them, coarse lattices first, each from the middle of the picture
-    outward; or parts of the list that have about as many rays. edges: by the lattice's spacing, how many lattice points a tile is wide."""
+    outward; or parts of the list that have about as many rays. edges: by the lattice's spacing, or FURTHER, how many points a tile is
+    wide."""
     if one.pixels is not None:
-        edge = edges[1]
+        edge = edges[FURTHER]
         rays = np.cumsum(one.pixels[:, 2] - one.pixels[:, 1])
         cuts = np.searchsorted(rays, np.arange(edge ** 2, rays[-1], edge ** 2))
         return [part for part in np.split(one.pixels, cuts) if len(part)]
     result = []
     for spacing in (*one.coarser, one.spacing):
-        columns, rows, edge = -(-width // spacing), -(-height // spacing), edges[spacing]
+        columns, rows, edge = -(-width // spacing), -(-height // spacing), edges[FURTHER if one.samples.start else spacing]
         skip = one.skip and spacing < COARSEST
         result += [np.array([x, y, min(edge, columns - x), min(edge, rows - y), spacing, skip, width, height], np.int64)
                    for x, y in _corners(columns, rows, edge)]

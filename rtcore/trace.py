@@ -16,16 +16,21 @@ from rtcore.lanes import LANES
 from rtcore.lens import bend
 from rtcore.lights import SAMPLED, SHINE, UNNOTED, UNTOLD, Draw, Reach
 from rtcore.plan import GLOW, VIEW, Plan
-from rtcore.scene import Background, Fog
+from rtcore.scene import Background, Fog, Light
 from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
-from rtcore.shapes._surface import find_kinds
-from rtcore.wave import NO_ANSWER, Beam, Wave, new_beam, new_wave, padded
+from rtcore.wave import NO_ANSWER, Beam, Wave, find_kinds, new_beam, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
 LEVEL = 1 << 12         # pairs of dimensions for the lights of one depth: so a light more changes nothing about the others
 SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
+
+#: What laps of the Clock are for.
+CAST, SPREAD, BEND = ("primary rays", "core"), ("pixel filter", "filter"), ("depth of field", "lens")
+FILM, DEPOSIT = ("film", "core"), ("film", "glow")
+DIM, ONWARD, ROUGHEN, GLOWING = ("fog", "fog"), ("reflected and refracted rays", "bounce"), ("glossy reflection", "gloss"), (GLOW, "glow")
+CASTING = ("shadow rays", "lit")
 
 #: Columns of Scratch.counts.
 COUNTS = ("reflection", "refraction", "primary", "primary_hits", "shadow", "shadow_hits", "nonfinite")
@@ -35,12 +40,21 @@ REFLECTION, REFRACTION, PRIMARY, PRIMARY_HITS, SHADOW, SHADOW_HITS, NONFINITE = 
 class Lamp(NamedTuple):
     """A light, ready for its kernel."""
 
-    name: str               # "point"
     shine: Callable
     numbers: np.ndarray
     color: np.ndarray
     sampled: bool           # it has an extent
     key: tuple              # what its shadows depend on
+    shining: tuple[str, str]        # laps of the Clock
+    gathering: tuple[str, str]
+
+
+class Laps(NamedTuple):
+    """What laps of the Clock are for, of one kind of shapes."""
+
+    hits: tuple[str, str]
+    surface: tuple[str, str]
+    shadows: tuple[str, str]
 
 
 class Clock:
@@ -54,10 +68,10 @@ class Clock:
         """What comes now counts, up to the next `lap`."""
         self._since = time.perf_counter()
 
-    def lap(self, stage: str, kernels: str) -> None:
-        """Since the last lap these kernels ran for this stage."""
+    def lap(self, what: tuple[str, str]) -> None:
+        """Since the last lap these kernels ran for this stage: (stage, kernel group)."""
         now = time.perf_counter()
-        self.seconds[stage, kernels] += now - self._since
+        self.seconds[what] += now - self._since
         self._since = now
 
 
@@ -146,9 +160,9 @@ class Tracer:
                  background: Background, fog: Fog | None):
         self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
-        self.lamps = [Lamp(type(light).__name__.lower(), SHINE[type(light)], light.numbers(),
-                           np.multiply(light.color, light.intensity, dtype=float), isinstance(light, SAMPLED), shadow_key(light))
-                      for light in plan.lights]
+        self.lamps = [self._lamp(light) for light in plan.lights]
+        names = [group.kind.name for group in geometry.groups]
+        self.laps = [Laps((f"hits: {name}", name), ("surface at the hits", name), ("shadow rays", name)) for name in names]
         # something asks which sample a ray belongs to
         self.filter = filters.made(settings.filter) if plan.filter else None
         self.numbered = lens is not None or plan.gloss or plan.filter or any(lamp.sampled for lamp in self.lamps)
@@ -157,6 +171,12 @@ class Tracer:
         # numbers of primitives whose surface rows are kept
         self.lasting = [(group.first, group.first + len(group.owner)) for group in geometry.groups if group.kind.lasting]
         self._code: dict[Callable, Callable] = {}
+
+    @staticmethod
+    def _lamp(light: Light) -> Lamp:
+        name, color = type(light).__name__.lower(), np.multiply(light.color, light.intensity, dtype=float)
+        return Lamp(SHINE[type(light)], light.numbers(), color, isinstance(light, SAMPLED), shadow_key(light),
+                    (f"light: {name}", f"light-{name}"), (f"light: {name}", "lit"))
 
     def run(self, kernel: Callable, *arguments):
         """Call a kernel. Within one tracer its arguments have the same types every time, so they are looked at once: that saves 2 of a
@@ -201,14 +221,14 @@ class Tracer:
     def _trace(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, stale: Callable[[], bool], first: First | None = None) -> bool:
         """Follow a wave of primary rays and add what it brings to the film; note what it hits if it holds its pixels' first samples."""
         counts, clock = np.zeros(len(COUNTS), np.int64), scratch.clock
-        clock.lap("primary rays", "core")
+        clock.lap(CAST)
         if self.filter is not None and first is None:   # a first sample is the pixel's centre
             filters.spread(wave, n, scratch.target, scratch.number, self.view, self.settings.size[0], self.filter.place, self.filter.sign,
                            self.settings.seed, scratch.signs)
-            clock.lap("pixel filter", "filter")
+            clock.lap(SPREAD)
         if self.lens is not None and first is None:     # and goes through the middle
             bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
-            clock.lap("depth of field", "lens")
+            clock.lap(BEND)
         counts[PRIMARY] = n
         try:
             self._hit(clock, wave, n, counts, stale, first)
@@ -220,6 +240,8 @@ class Tracer:
             else:
                 scratch.sample[:, :n] = 0
         except Stale:
+            if first is not None and len(film.lit):     # what it noted of lights does not count
+                film.lit[scratch.target[:n]] = 0
             return False
         if len(film.plain):
             if first is not None:
@@ -227,22 +249,20 @@ class Tracer:
             counts[NONFINITE] = filters.commit(film, scratch.sample, n, scratch.target, scratch.signs)
         else:
             counts[NONFINITE] = self.run(films.commit, film, scratch.sample, n, scratch.target)
-        clock.lap("film", "core")
+        clock.lap(FILM)
         scratch.counts += counts
         return True
 
     def _note(self, scratch: Scratch, film: films.Film, wave: Wave, n: int, recall: Recall | None) -> None:
         """Note on the film what first samples hit, unless it is there from before."""
-        anew = recall is None or not recall.noted
-        if anew or len(film.lit):       # what a tile that was given up has noted of lights does not count
-            self.run(films.note_first_hits, film, wave, n, scratch.target, anew)
-        if anew:
+        if recall is None or not recall.noted:
+            self.run(films.note_first_hits, film, wave, n, scratch.target)
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
         if recall is not None:
             recall.note_film()
-        scratch.clock.lap("film", "core")
+        scratch.clock.lap(FILM)
 
     def _follow(self, scratch: Scratch, wave: Wave, n: int, counts: np.ndarray, stale: Callable[[], bool], first: First | None) -> None:
         """Light a wave that has hit, and all that comes of it, level by level."""
@@ -253,27 +273,27 @@ class Tracer:
             self._light(scratch, wave, n, depth, counts, stale, first)
             if self.fog is not None:
                 self.run(fogs.dim, wave, n, self.fog)
-                clock.lap("fog", "fog")
+                clock.lap(DIM)
             self.run(films.deposit, wave, n, scratch.sample, depth == 1)
-            clock.lap("film", "glow")
+            clock.lap(DEPOSIT)
             if stale():
                 raise Stale
             if not self.plan.bounces or depth == self.settings.max_depth:
                 return
             child = scratch.wave(depth, 2 * n)
             sent = self.run(shading.bounce, wave, n, self.look, child, counts)
-            clock.lap("reflected and refracted rays", "bounce")
+            clock.lap(ONWARD)
             if self.plan.gloss and first is None:       # a first sample goes the smooth way
                 gloss.roughen(wave, child, sent, self.look, scratch.path(depth - 1, n), scratch.path(depth, sent), scratch.target,
                               scratch.number, self.settings.seed)
-                clock.lap("glossy reflection", "gloss")
+                clock.lap(ROUGHEN)
             n, wave = sent, child
             if n == 0:
                 return
 
     def _hit(self, clock: Clock, wave: Wave, n: int, counts: np.ndarray, stale: Callable[[], bool], first: First | None) -> None:
         """Nearest hits and their surfaces. Rays of which they are known are not traced, nor counted."""
-        recall, known, spared = first and first.recall, 0, ("primary rays", "core")     # looking up counts to what it spares
+        recall, known, spared = first and first.recall, 0, CAST     # looking up counts to what it spares
         if recall is None:
             wave.rays.doubt[:n] = 0     # only kinds that can doubt write it
         else:
@@ -285,33 +305,38 @@ class Tracer:
             else:
                 counts[REFLECTION] -= reflected
                 counts[REFRACTION] -= refracted
-                spared = "reflected and refracted rays", "bounce"
-            clock.lap(*spared)
-        for group in self.geometry.groups if known < n else ():
+                spared = ONWARD
+            clock.lap(spared)
+        for group, laps in zip(self.geometry.groups, self.laps) if known < n else ():
             self.run(group.kind.intersect, wave.rays, n, group.tree, group.table, group.first, CLOSEST)
-            clock.lap(f"hits: {group.kind.name}", group.kind.name)
+            clock.lap(laps.hits)
             if stale():
                 raise Stale
         if recall is not None:
             recall.note_hits(wave, n)
-            clock.lap(*spared)
+            clock.lap(spared)
         given = recall is not None and bool(self.lasting) and recall.rows(wave)
-        found = np.zeros(len(self.ends), bool)
-        self.run(find_kinds, wave.rays.prim, n, self.ends, found)
-        for group, there in zip(self.geometry.groups, found):
+        found = recall and recall.levels[-1].found
+        if found is None:
+            flags = np.zeros(len(self.ends), bool)
+            self.run(find_kinds, wave.rays.prim, n, self.ends, flags)
+            found = flags.tolist()
+            if recall is not None:
+                recall.levels[-1].found = found
+        for group, laps, there in zip(self.geometry.groups, self.laps, found):
             if there and not (given and group.kind.lasting):
                 self.run(group.kind.surface, wave.rays, n, wave.surface, group.table, group.first)
-                clock.lap("surface at the hits", group.kind.name)
-        if recall is not None and self.lasting and not given:
+                clock.lap(laps.surface)
+        if recall is not None and self.lasting and recall.levels[-1].rows is None:
             recall.note_rows(wave, n, self.lasting)
-            clock.lap(*spared)
+            clock.lap(spared)
 
     def _light(self, scratch: Scratch, wave: Wave, n: int, depth: int, counts: np.ndarray, stale: Callable[[], bool],
                first: First | None) -> None:
         clock = scratch.clock
         if not self.lamps:
             self.run(shading.glow, wave, n, self.look, NO_ANSWER)
-            clock.lap(GLOW, "glow")
+            clock.lap(GLOWING)
             return
         recall, share = first and first.recall, np.float32(1 / len(self.lamps))
         reaches = self._reaches(scratch, n, recall, first.film.lit if first is not None and depth == 1 else UNNOTED, share)
@@ -319,7 +344,7 @@ class Tracer:
         together = 1 if any(len(reach.depth) for reach in reaches) else min(max(SHADOW_RAYS // n, 1), len(self.lamps))
         beam = scratch.beams(n, together)
         self.run(shading.glow, wave, n, self.look, beam.answer)
-        clock.lap(GLOW, "glow")
+        clock.lap(GLOWING)
         pairs = LIGHTS + depth * LEVEL
         for k in range(0, len(self.lamps), together):
             m, lamps, ends = 0, self.lamps[k:k + together], [0]
@@ -327,7 +352,7 @@ class Tracer:
                 draw = (Draw(scratch.target, scratch.number, pairs + j, self.settings.seed),) if lamp.sampled else ()
                 m = self.run(lamp.shine, wave, n, lamp.numbers, lamp.color, beam, m, reaches[j], *draw)
                 ends.append(m)
-                clock.lap(f"light: {lamp.name}", f"light-{lamp.name}")
+                clock.lap(lamp.shining)
             if m == 0:
                 continue
             if self.plan.shadows:
@@ -337,7 +362,7 @@ class Tracer:
             if first is not None and depth == 1 and len(first.film.lit):
                 films.note_lit(first.film, beam, m, scratch.target, share)
             counts[SHADOW_HITS] += self.run(shading.gather, wave, beam, m)
-            clock.lap(f"light: {lamps[0].name}", "lit")
+            clock.lap(lamps[0].gathering)
 
     def _reaches(self, scratch: Scratch, n: int, recall: Recall | None, lit: np.ndarray, share: np.float32) -> list[Reach]:
         """What is known of how far each light reaches the hits of a wave: all of it where there are no shadows."""
@@ -345,7 +370,8 @@ class Tracer:
             depths = [scratch.nothing(n)] * len(self.lamps)
         else:
             depths = [recall and recall.reach(lamp.key) for lamp in self.lamps]
-        return [Reach(UNTOLD if depth is None else depth, lit, scratch.target[:n], share) for depth in depths]
+        target = scratch.target[:n]
+        return [Reach(UNTOLD if depth is None else depth, lit, target, share) for depth in depths]
 
     def _shadows(self, clock: Clock, beam: Beam, parts: list[tuple], stale, recall: Recall | None) -> tuple[int, int]:
         """What is in the way of a beam's rays, those of each light being a part (key, first column, one past the last). Returns of how many
@@ -354,14 +380,14 @@ class Tracer:
         if recall is not None:
             known = m - sum(recall.shadows(beam, *part) for part in parts)
             blocked = int(np.count_nonzero(beam.rays.prim[:m] >= 0))
-            clock.lap("shadow rays", "lit")
-        for group in self.geometry.groups if known < m else ():
+            clock.lap(CASTING)
+        for group, laps in zip(self.geometry.groups, self.laps) if known < m else ():
             self.run(group.kind.intersect, beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
-            clock.lap("shadow rays", group.kind.name)
+            clock.lap(laps.shadows)
             if stale():
                 raise Stale
         if recall is not None and known < m:
             for part in parts:
                 recall.note_shadows(beam, *part)
-            clock.lap("shadow rays", "lit")
+            clock.lap(CASTING)
         return known, blocked

@@ -18,9 +18,8 @@ from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
-from rtcore.shapes._surface import find_kinds
 from rtcore.trace import CLOSEST, COUNTS
-from rtcore.wave import NO_ANSWER, SURFACE_ROWS, new_beam, new_rays, new_wave
+from rtcore.wave import NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
 
 
 def _wave(dtype):
@@ -37,7 +36,7 @@ def _look():
 def _core(dtype):
     wave, target, n = _wave(dtype)
     film, sample = films.new_film(8, 8), np.zeros((3, 64), np.float32)
-    films.note_first_hits(film, wave, n, target, True)
+    films.note_first_hits(film, wave, n, target)
     films.commit(film, sample, n, target)
     find_kinds(wave.rays.prim, n, np.zeros(0, np.int64), np.zeros(0, bool))
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
@@ -130,6 +129,7 @@ def _keep(dtype):
     again = Recall(memory.tiles[b""])
     again.hits(wave, n)
     again.note_hits(wave, n)
+    again.rows(wave)
     again.shadows(beam, (), 0, 0)
 
 

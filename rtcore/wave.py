@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtcore.jit import inline
+from rtcore.indices import among
+from rtcore.jit import inline, kernel
 from rtcore.lanes import LANES, add_where, any_lane, exceeds, load, select, store, store_where, wide
 
 # rows of Rays.ray: origin, direction, the open interval (START, T) in which hits count; T becomes the nearest hit
@@ -157,3 +158,14 @@ def finish(rays, n):
     """Let the columns after the last of n rays, up to a whole vector, be dead."""
     for i in range(n, (n + LANES - 1) // LANES * LANES):
         put_ray(rays, i, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, DEAD)
+
+
+@kernel
+def find_kinds(prim, n, ends, found):
+    """Which kinds rays 0 .. n-1 have hit. ends: int64, one past the last primitive of each; found: bool, False to begin with."""
+    for k in range(len(ends)):
+        first = ends[k - 1] if k > 0 else 0
+        for i in range(0, n, LANES):
+            if any_lane(among(prim, i, first, ends[k])):
+                found[k] = True
+                break

@@ -4,7 +4,7 @@ import time
 import pytest
 
 from rtcore import Camera, Scene, Sphere
-from rtcore.pace import LONG, Pace
+from rtcore.pace import EDGES, LONG, Pace
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.schedule import COARSEST, LATTICES, TILE, Pass, passes, tiles, weight
 from rtcore.settings import Settings
@@ -42,7 +42,7 @@ def test_a_lattice_that_was_timed_tells_of_its_neighbours():
 @pytest.mark.parametrize("each", [1e-8, 1e-7, 1e-6, 1e-5])
 def test_a_tile_is_soon_over(each):
     edge = pace(s1=each).edge(1)
-    assert edge ** 2 * each <= LONG and (edge == 2 * TILE or (2 * edge) ** 2 * each > LONG)
+    assert edge ** 2 * each <= LONG and (edge == max(EDGES) or (2 * edge) ** 2 * each > LONG)
 
 
 @pytest.mark.parametrize("first", LATTICES)

@@ -35,17 +35,17 @@ def hit_points(wave, i):
 
 
 @inline
-def shine_on(wave, i, beam, j, color, way, end, strength, reach):
-    """The shadow rays of hits i .. i+7 into the columns of the beam from j on, which has room for eight; returns their number. way, end,
-    strength (lanes): direction to the light, t of the light, how strong it is there. No ray starts from a surface that faces away, or that
-    answers no light; nor where `reach` knows what it would meet: such hits get their light at once."""
+def shine_on(wave, i, beam, j, color, way, toward, end, strength, reach):
+    """The shadow rays of hits i .. i+7 into the columns of the beam from j on, which has room for eight; returns their number. way, toward,
+    end, strength (lanes): direction to the light, the same at length 1, t of the light, how strong it is there. No ray starts from a
+    surface that faces away, or that answers no light; nor where `reach` knows what it would meet: such hits get their light at once."""
     known = reach.depth.shape[0] > 0
     if known and bits(exceeds(reach.depth, i, OPAQUE - 1)) == 255:
         return 0
     surface, answer, ray, bring = wave.surface, beam.answer, beam.rays.ray, beam.bring
     d, g, normal = wide(load3(wave.rays.ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, NX, i))
     side = select(dot(d, g) < 0, 1, zero(d.x) - 1)      # the side that the ray comes from
-    g, normal, toward = g * side, normal * side, normalized(way)
+    g, normal = g * side, normal * side
     cosine, gloss = dot(normal, toward), wide(load(answer, GLOSS, i))
     red, green, blue = wide(load(answer, 0, i)), wide(load(answer, 1, i)), wide(load(answer, 2, i))
     ok = exceeds(wave.rays.prim, i, -1) & (cosine > 0) & (dot(g, toward) > 0) & (strength > 0)

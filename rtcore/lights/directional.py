@@ -28,6 +28,6 @@ def shine(wave, n, light, color, beam, first, reach):
     for i in range(0, n, LANES):
         none = zero(hit_points(wave, i).x)
         way = vec3(none + light[0], none + light[1], none + light[2])
-        first += shine_on(wave, i, beam, first, color, way, none + np.inf, none + 1, reach)
+        first += shine_on(wave, i, beam, first, color, way, way, none + np.inf, none + 1, reach)
     finish(beam.rays, first)
     return first

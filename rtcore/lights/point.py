@@ -3,6 +3,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.fields import Choice, Vec, Vector
 from rtcore.jit import kernel
 from rtcore.lanes import LANES, select, vec3, zero
@@ -33,6 +34,7 @@ def shine(wave, n, light, color, beam, first, reach):
         square = x * x + y * y + z * z
         # a surface that contains the light is not lit by it
         strength = select(square > 0, 1 / square if light[3] != 0 else 1 + zero(square), 0)
-        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 + zero(square), strength, reach)
+        way = vec3(x, y, z)
+        first += shine_on(wave, i, beam, first, color, way, normalized(way), 1 + zero(square), strength, reach)
     finish(beam.rays, first)
     return first

@@ -4,6 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.directions import normalized
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.jit import kernel
 from rtcore.lanes import LANES, load, root, select, vec3
@@ -50,6 +51,7 @@ def shine(wave, n, light, color, beam, first, reach, draw):
         height = -(x * light[9] + y * light[10] + z * light[11])    # of the hit before the panel's plane
         square = x * x + y * y + z * z
         strength = select(height > 0, height / (square * root(square)), 0)
-        first += shine_on(wave, i, beam, first, color, vec3(x, y, z), 1 - light[12] / height, strength, reach)
+        way = vec3(x, y, z)
+        first += shine_on(wave, i, beam, first, color, way, normalized(way), 1 - light[12] / height, strength, reach)
     finish(beam.rays, first)
     return first

@@ -55,6 +55,6 @@ def shine(wave, n, light, color, beam, first, reach, draw):
         way = vec3((1 - low) * x + a * (1 + sign * x * x * p) + b * q, (1 - low) * y + a * sign * q + b * (sign + y * y * p),
                    (1 - low) * z - a * sign * x - b * y)
         end = d * (1 - low - root(greatest(share - sine, 0))) - radius * 2.0 ** -10
-        first += shine_on(wave, i, beam, first, color, way, end, select(share < 1, 2 / (d * d * (1 + rest)), 0), reach)
+        first += shine_on(wave, i, beam, first, color, way, way, end, select(share < 1, 2 / (d * d * (1 + rest)), 0), reach)
     finish(beam.rays, first)
     return first

@@ -3,22 +3,11 @@ anything; only those of the mask are written."""
 import numpy as np
 
 from rtcore.directions import normalized
-from rtcore.indices import among, pick, pick3, put, put3
-from rtcore.jit import inline, inline_new, kernel
-from rtcore.lanes import LANES, any_lane, greatest, load, load3, select, size, store, vec3, wide
+from rtcore.indices import pick, pick3, put, put3
+from rtcore.jit import inline, inline_new
+from rtcore.lanes import LANES, greatest, load, load3, select, size, store, vec3, wide
 from rtcore.shapes.kind import REACH
 from rtcore.wave import DX, ERR, GX, NX, OX, PX, T, U, V
-
-
-@kernel
-def find_kinds(prim, n, ends, found):
-    """Which kinds rays 0 .. n-1 have hit. ends: int64, one past the last primitive of each; found: bool, False to begin with."""
-    for k in range(len(ends)):
-        first = ends[k - 1] if k > 0 else 0
-        for i in range(0, n, LANES):
-            if any_lane(among(prim, i, first, ends[k])):
-                found[k] = True
-                break
 
 
 @inline
