@@ -159,7 +159,7 @@ class Render:
         one, size = self.schedule[self.number], self.settings.size
         if one.samples == range(1):
             for spacing in (*one.coarser, one.spacing):
-                self.edges.setdefault(spacing, self.pace.edge(spacing))
+                self.edges.setdefault(spacing, self.pace.edge(spacing, size, len(self.scratches), not (self.coarse or self.plan.bounces)))
         else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, and never larger
             edge = self.edges.get(FURTHER, self.edges[1])
             self.edges[FURTHER] = min(edge, TILE) if one.region else edge

@@ -19,7 +19,7 @@ def pace(**seconds) -> Pace:
 
 
 def test_nothing_known_means_the_coarsest_lattice_and_tiles_as_ever():
-    assert Pace().finest(10 ** 6, 2, 0.1, False) == COARSEST and Pace().edge(1) == TILE
+    assert Pace().finest(10 ** 6, 2, 0.1, False) == COARSEST and Pace().edge(1, (1280, 720), 2) == TILE
     assert Pace().finest(10 ** 6, 2, 0.1, True) == 1        # known hits are quick until they turn out not to be
 
 
@@ -41,7 +41,7 @@ def test_a_lattice_that_was_timed_tells_of_its_neighbours():
 
 @pytest.mark.parametrize("each", [1e-8, 1e-7, 1e-6, 1e-5])
 def test_a_tile_is_soon_over(each):
-    edge = pace(s1=each).edge(1)
+    edge = pace(s1=each).edge(1, (4000, 4000), 2)
     assert edge ** 2 * each <= LONG and (edge == max(EDGES) or (2 * edge) ** 2 * each > LONG)
 
 
