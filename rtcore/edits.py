@@ -9,7 +9,7 @@ import msgspec
 from rtcore.camera import Camera
 from rtcore.fields import Record
 from rtcore.lights import SHINE, STUDIO
-from rtcore.scene import Leaf, Light, Scene
+from rtcore.scene import Leaf, Light, Scene, same_place
 from rtcore.settings import Settings
 
 KEPT, ITS, TOUCHED, ANEW = "kept", "its own", "where touched", "anew"
@@ -128,7 +128,7 @@ def _leaf(a: Leaf, b: Leaf) -> set[str]:
     edits = set()
     if a.visible != b.visible:
         edits.add("hide")
-    elif a.visible and (a.shape is not b.shape or a.matrix.tobytes() != b.matrix.tobytes()):
+    elif a.visible and (a.shape is not b.shape or not same_place(a, b)):
         edits.add("shape")
     if a.material is not b.material and _bare(a.material) != _bare(b.material):
         edits.add("material")

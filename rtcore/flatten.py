@@ -10,7 +10,7 @@ import numpy as np
 from rtcore.bvh import EMPTY_TREE, Tree, build
 from rtcore.fields import FieldError
 from rtcore.latest import leaves_of
-from rtcore.scene import Leaf, Scene
+from rtcore.scene import Leaf, Scene, same_place
 from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
 
 FEW, MANY = 16, 20_000      # of leaves with so few primitives what they were packed to is kept, in kinds of not too many leaves
@@ -50,8 +50,8 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
     """
     dtype = DTYPES[precision]
     leaves = leaves_of(scene)
-    if previous is not None and previous.leaves is leaves and previous.dtype == dtype:
-        return previous
+    if previous is not None and previous.dtype == dtype and (previous.leaves is leaves or _placed_alike(previous.leaves, leaves)):
+        return previous._replace(leaves=leaves)
     kinds: dict[Kind, list[int]] = {}
     for index, leaf in enumerate(leaves):
         if leaf.visible:
@@ -81,6 +81,11 @@ def nbytes(arrays: Iterable) -> int:
 def _is(placed: list, leaf: Leaf) -> bool:
     """Whether a leaf is this shape under this matrix."""
     return placed[0] is leaf.shape and placed[1] == leaf.matrix.tobytes()
+
+
+def _placed_alike(a: tuple[Leaf, ...], b: tuple[Leaf, ...]) -> bool:
+    """Whether leaves differ in materials at most."""
+    return len(a) == len(b) and all(x.shape is y.shape and x.visible == y.visible and same_place(x, y) for x, y in zip(a, b))
 
 
 def _same(a: tuple, b: tuple) -> bool:

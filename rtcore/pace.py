@@ -6,6 +6,7 @@ from rtcore.schedule import COARSEST, LATTICES, TILE
 EDGES = (3 * TILE, 2 * TILE, TILE, TILE // 2, TILE // 4)
 ENOUGH = 6          # tiles for each thread, so that they end at about the same time
 LONG = 0.03         # seconds that a tile may take; that it is not wanted any more its thread sees after each kind of shapes
+SAFE = 0.8          # share of the deadline that is planned with: one view takes longer than the one before
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
 
 
@@ -41,7 +42,7 @@ class Pace:
 
     def finest(self, pixels: int, threads: int, deadline: float, known: bool) -> int:
         """Spacing of the finest lattice that is likely to be on the screen `deadline` seconds from now."""
-        budget = max(deadline - self.frame, deadline / 4) * threads
+        budget = max(SAFE * deadline - self.frame, deadline / 4) * threads
         for spacing in reversed(LATTICES):
             each = self._known if known else self.seconds(spacing)
             if each is not None and each * pixels / spacing ** 2 <= budget:

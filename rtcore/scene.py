@@ -365,7 +365,12 @@ def walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: dic
                 yield from below(child, (*path, i), matrix, material, visible)
 
     for i, node in enumerate(objects):
-        yield from below(node, (i,), np.eye(4), DEFAULT_MATERIAL, True)
+        yield from below(node, (i,), UNMOVED, DEFAULT_MATERIAL, True)
+
+
+def same_place(a: Leaf, b: Leaf) -> bool:
+    """Whether two leaves stand under the same matrix."""
+    return a.matrix is b.matrix or a.matrix.tobytes() == b.matrix.tobytes()
 
 
 def one_of(what: str, names) -> str:
@@ -374,3 +379,5 @@ def one_of(what: str, names) -> str:
 
 
 DEFAULT_MATERIAL = Material()
+UNMOVED = np.eye(4)
+UNMOVED.flags.writeable = False

@@ -52,8 +52,8 @@ def make_look(leaves: tuple[Leaf, ...], leaf: np.ndarray, ambient: np.ndarray, b
 @Latest
 def _tables(leaves: tuple[Leaf, ...], leaf: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The first three fields of `Look`."""
-    rows, index, used = [], {}, np.unique(leaf)
-    row_of, depth_of = np.zeros(len(leaves), np.int32), np.zeros(len(leaves), np.int32)
+    rows, depths, index, used = [], [], {}, np.unique(leaf)
+    row_of = np.zeros(len(leaves), np.int32)
     for i in used:
         material, matrix = leaves[i].material, leaves[i].matrix
         # a pattern sits in the object's space, so its leaves need rows of their own
@@ -61,9 +61,10 @@ def _tables(leaves: tuple[Leaf, ...], leaf: np.ndarray) -> tuple[np.ndarray, np.
         if key not in index:
             index[key] = len(rows)
             rows.append(_row(material, matrix))
+            depths.append(optical_depth(material))
         row_of[i] = index[key]
-        depth_of[i] = optical_depth(material)
-    return np.array(rows).reshape(-1, MATERIAL_COLUMNS), row_of[leaf], depth_of[leaf]
+    of = row_of[leaf]
+    return np.array(rows).reshape(-1, MATERIAL_COLUMNS), of, np.array(depths, np.int32)[of]
 
 
 def optical_depth(material: Material) -> int:

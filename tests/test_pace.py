@@ -23,7 +23,7 @@ def test_nothing_known_means_the_coarsest_lattice_and_tiles_as_ever():
     assert Pace().finest(10 ** 6, 2, 0.1, True) == 1        # known hits are quick until they turn out not to be
 
 
-@pytest.mark.parametrize("each, spacing", [(1e-8, 1), (1e-7, 1), (2e-7, 2), (7e-7, 4), (1e-6, 8), (1e-5, 16), (1.0, 16)])
+@pytest.mark.parametrize("each, spacing", [(1e-8, 1), (8e-8, 1), (1e-7, 2), (2e-7, 2), (5e-7, 4), (1e-6, 8), (1e-5, 16), (1.0, 16)])
 def test_the_lattice_is_as_fine_as_the_deadline_allows(each, spacing):
     found = pace(s1=each)
     assert found.finest(10 ** 6, 1, 0.1, False) == spacing
