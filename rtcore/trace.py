@@ -319,7 +319,7 @@ class Tracer:
             recall.note_hits(wave, n)
             clock.lap(spared)
         given = recall is not None and bool(self.lasting) and recall.rows(wave)
-        found = recall and recall.levels[-1].found
+        found = [True] if len(self.ends) == 1 else recall and recall.levels[-1].found
         if found is None:
             flags = np.zeros(len(self.ends), bool)
             self.run(find_kinds, wave.rays.prim, n, self.ends, flags)
