@@ -4,7 +4,7 @@ import math
 from rtcore.schedule import COARSEST, LATTICES, TILE
 
 EDGES = (3 * TILE, 2 * TILE, TILE, TILE // 2, TILE // 4)
-ENOUGH = 6          # tiles for each thread, so that they end at about the same time
+ENOUGH, FEWER = 6, 3    # tiles for each thread, so that they end at about the same time; of a coarse lattice, which is soon done
 LONG = 0.03         # seconds that a tile may take; that it is not wanted any more its thread sees after each kind of shapes
 SAFE = 0.8          # share of the deadline that is planned with: one view takes longer than the one before
 SPREAD = 1.5        # rays further apart have less in common: each doubling of the spacing is taken to make them so much slower
@@ -57,5 +57,5 @@ class Pace:
 
         def suits(edge: int) -> bool:
             soon = light or edge <= TILE if each is None else edge ** 2 * each <= LONG
-            return soon and math.prod(-(-side // (spacing * edge)) for side in size) >= ENOUGH * threads
+            return soon and math.prod(-(-side // (spacing * edge)) for side in size) >= (ENOUGH if spacing == 1 else FEWER) * threads
         return next(filter(suits, EDGES), EDGES[-1])
