@@ -160,7 +160,7 @@ class Render:
         if one.samples == range(1):
             for spacing in (*one.coarser, one.spacing):
                 self.edges.setdefault(spacing, self.pace.edge(spacing, size, len(self.scratches), not (self.coarse or self.plan.bounces)))
-        else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, and never larger
+        else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, never larger
             edge = self.edges.get(FURTHER, self.edges[1])
             self.edges[FURTHER] = min(edge, TILE) if one.region else edge
         queue = tiles(one, *size, self.edges)
@@ -236,8 +236,9 @@ class Render:
         """The film as it is to be read."""
         return filters.settled(self.film, self.gain)
 
-    def goes_on(self) -> bool:
-        """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes."""
+    def goes_on(self, cancelled: Callable[[], bool]) -> bool | None:
+        """Whether another pass is wanted; an adaptive one is added to the schedule. Asked between passes. None: given up, for that takes
+        some 30 ms and was not wanted any more."""
         target, growth = self.settings.error, adaptive.GROWTH
         if target is not None:
             estimate = self.error()
@@ -246,6 +247,10 @@ class Render:
             if estimate is not None:        # no more than is likely to be needed
                 growth = min(max((estimate / target) ** (2 / adaptive.POWER) - 1, growth / 8), growth)
         while self.number + 1 == len(self.schedule):
+            if self.adaptive:
+                self.squared_errors()
+                if cancelled():
+                    return None
             one = self._refinement(growth, target or adaptive.CONVERGED) if self.adaptive else None
             self.converged = one is not None and len(one.pixels) == 0
             if one is not None and len(one.pixels):

@@ -122,7 +122,10 @@ class Renderer:
                     yield render.frame(False)
             if cancelled():
                 return
-            render.done = not (render.finished and render.goes_on())
+            more = render.finished and render.goes_on(cancelled)
+            if more is None:
+                return
+            render.done = not more
             if cancelled() and not render.done:
                 render.number += 1      # when it goes on, it does so with the next pass
                 return
