@@ -1,7 +1,8 @@
 """Boxes around what is bounded: for framing, and for the window's selection."""
 import numpy as np
 
-from rtcore.scene import Leaf, Scene
+from rtcore.leaves import Leaf
+from rtcore.scene import Scene
 
 
 def leaf_bounds(leaf: Leaf) -> tuple[np.ndarray, np.ndarray] | None:

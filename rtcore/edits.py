@@ -9,7 +9,8 @@ import msgspec
 from rtcore.camera import Camera
 from rtcore.fields import Record
 from rtcore.lights import SHINE, STUDIO
-from rtcore.scene import Leaf, Light, Scene, same_place
+from rtcore.leaves import Leaf, same_place
+from rtcore.scene import Light, Scene
 from rtcore.settings import Settings
 
 KEPT, ITS, TOUCHED, ANEW = "kept", "its own", "where touched", "anew"
@@ -76,11 +77,11 @@ def change(old: tuple[Scene, Camera, Settings], new: tuple[Scene, Camera, Settin
         edits.add("lens" if _pinhole(old[1]) == _pinhole(new[1]) else "camera")
     if old[0] is not new[0]:
         edits |= _scene(old[0], new[0])
-        if before is not after and (len(before) != len(after) or any(a.path != b.path for a, b in zip(before, after))):
+        if before is not after and (len(before) != len(after) or any(a is not b and a.path != b.path for a, b in zip(before, after))):
             edits.add("nodes")
         else:
             for index, (a, b) in enumerate(zip(before, after) if before is not after else ()):
-                if edit := _leaf(a, b):
+                if a is not b and (edit := _leaf(a, b)):
                     edits |= edit
                     if edit & {"hide", "shape"}:
                         leaves.append(index)

@@ -10,7 +10,8 @@ import numpy as np
 from rtcore.bvh import EMPTY_TREE, Tree, build
 from rtcore.fields import FieldError
 from rtcore.latest import leaves_of
-from rtcore.scene import Leaf, Scene, same_place
+from rtcore.leaves import Leaf, same_place
+from rtcore.scene import Scene
 from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
 
 FEW, MANY = 16, 20_000      # of leaves with so few primitives what they were packed to is kept, in kinds of not too many leaves
@@ -85,7 +86,8 @@ def _is(placed: list, leaf: Leaf) -> bool:
 
 def _placed_alike(a: tuple[Leaf, ...], b: tuple[Leaf, ...]) -> bool:
     """Whether leaves differ in materials at most."""
-    return len(a) == len(b) and all(x.shape is y.shape and x.visible == y.visible and same_place(x, y) for x, y in zip(a, b))
+    return len(a) == len(b) and all(
+        x is y or x.shape is y.shape and x.visible == y.visible and same_place(x, y) for x, y in zip(a, b))
 
 
 def _same(a: tuple, b: tuple) -> bool:

@@ -2,7 +2,8 @@
 import functools
 from collections.abc import Callable
 
-from rtcore.scene import Leaf, Scene, walk
+from rtcore.leaves import Branch, Leaf, Names, walk
+from rtcore.scene import TOP, Scene
 
 
 class Latest:
@@ -22,11 +23,29 @@ class Latest:
         return result
 
 
-@Latest
-def _leaves(objects, definitions, materials) -> tuple[Leaf, ...]:
-    return tuple(walk(objects, definitions, materials))
+class _Leaves:
+    """The leaves of the latest scene, which the next one's share as far as they are the same."""
+
+    def __init__(self):
+        self._last: tuple[Names, Branch, tuple[Leaf, ...]] | None = None    # replaced at once, so threads may share it
+
+    def __call__(self, scene: Scene) -> tuple[Leaf, ...]:
+        last, same = self._last, False
+        if last is not None:
+            same = scene.definitions is last[0].definitions and scene.materials is last[0].materials
+            if same and scene.objects is last[1].nodes:
+                return last[2]
+        names = Names(scene.definitions, scene.materials, same)
+        branch = walk(scene.objects, TOP, names, last and last[1])
+        leaves = tuple(branch.leaves)
+        self._last = names, branch, leaves
+        return leaves
+
+
+_leaves = _Leaves()
 
 
 def leaves_of(scene: Scene) -> tuple[Leaf, ...]:
-    """`scene.leaves()`, the very same tuple for scenes that differ in lights, fog or the like only."""
-    return _leaves(scene.objects, scene.definitions, scene.materials)
+    """`scene.leaves()`: the very same tuple for scenes that differ in lights, fog or the like only, and the very same leaves where they are
+    as they were."""
+    return _leaves(scene)

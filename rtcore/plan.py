@@ -6,7 +6,8 @@ import numpy as np
 from rtcore.camera import Camera
 from rtcore.lights import SHINE, STUDIO, Ambient
 from rtcore.latest import Latest, leaves_of
-from rtcore.scene import Leaf, Light, Material, Scene
+from rtcore.leaves import Leaf
+from rtcore.scene import Light, Material, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL, KINDS
 from rtcore.shapes.kind import Kind

@@ -5,13 +5,14 @@ Nothing here is compiled. Lengths are in scene units, angles in degrees, colours
 """
 import math
 from collections.abc import Iterator
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import msgspec
 import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.fields import Choice, Color, Field, FieldError, Flag, Maybe, Number, Record, Text, Vec, Vector
+from rtcore.leaves import Leaf, Names, walk
 
 MOST_NESTED = 200       # groups inside groups; a deeper file is a mistake or an attack
 MOST_LEAVES = 4_000_000  # shapes after every use of a definition is counted
@@ -267,16 +268,6 @@ def as_nodes(items, where: str) -> tuple[Node, ...]:
     return tuple(nodes)
 
 
-class Leaf(NamedTuple):
-    """One shape where it stands: what a hit's node index counts."""
-
-    path: tuple[int, ...]       # child indices from the scene's objects down, through uses as well
-    shape: Shape
-    matrix: np.ndarray          # 4 x 4, shape to world
-    material: Material
-    visible: bool
-
-
 class Scene(Record, frozen=True, kw_only=True, weakref=True):
     """All that a picture needs. `objects` may hold bare shapes; without a camera the scene is framed when it is rendered.
 
@@ -309,6 +300,9 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
         """Every name used is defined, no definition uses itself, nesting and the number of leaves are bounded."""
         leaves: dict[str, tuple[int, int]] = {}     # definition -> leaves below it, levels below it
 
+        def plain(node: Node) -> bool:      # most are; thousands are passed in a millisecond
+            return node.shape is not None and (not isinstance(node.material, str) or node.material in self.materials)
+
         def measure(node: Node, path: str, open_: tuple[str, ...], depth: int) -> tuple[int, int]:
             if depth > MOST_NESTED:
                 raise FieldError(f"at most {MOST_NESTED} groups inside one another", depth, path)
@@ -324,7 +318,8 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
                     leaves[node.use] = measure(self.definitions[node.use], f"definitions.{node.use}", (*open_, node.use), depth + 1)
                 count, levels = leaves[node.use]
             elif node.children is not None:
-                below = [measure(c, f"{path}.group[{i}]", open_, depth + 1) for i, c in enumerate(node.children)]
+                below = [(1, 1) if depth + 1 < MOST_NESTED and plain(c) else measure(c, f"{path}.group[{i}]", open_, depth + 1)
+                         for i, c in enumerate(node.children)]
                 # an empty group counts as well: a walk has to look at each of its uses
                 count, levels = max(sum(b[0] for b in below), 1), max((b[1] for b in below), default=0)
             else:
@@ -335,7 +330,7 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
                 raise FieldError(f"at most {MOST_NESTED} groups inside one another", depth + levels + 1, path)
             return count, levels + 1
 
-        total = sum(measure(node, f"scene[{i}]", (), 0)[0] for i, node in enumerate(self.objects))
+        total = sum(1 if plain(node) else measure(node, f"scene[{i}]", (), 0)[0] for i, node in enumerate(self.objects))
         if total > MOST_LEAVES:
             raise FieldError(f"at most {MOST_LEAVES:,} shapes", total, "scene")
         for name, node in self.definitions.items():
@@ -344,33 +339,7 @@ class Scene(Record, frozen=True, kw_only=True, weakref=True):
 
     def leaves(self) -> Iterator[Leaf]:
         """Every shape of the scene with the uses written out, depth first; a hit's node index counts these, hidden ones too."""
-        return walk(self.objects, self.definitions, self.materials)
-
-
-def walk(objects: tuple[Node, ...], definitions: dict[str, Node], materials: dict[str, Material]) -> Iterator[Leaf]:
-    """`Scene.leaves`, from what it depends on."""
-
-    def below(node: Node, path, matrix, material, visible):
-        if node.transform:
-            matrix = matrix @ node.matrix()
-        if node.material is not None:
-            material = materials[node.material] if isinstance(node.material, str) else node.material
-        visible = visible and node.visible
-        if node.shape is not None:
-            yield Leaf(path, node.shape, matrix, material, visible)
-        elif node.use is not None:
-            yield from below(definitions[node.use], (*path, 0), matrix, material, visible)
-        else:
-            for i, child in enumerate(node.children):
-                yield from below(child, (*path, i), matrix, material, visible)
-
-    for i, node in enumerate(objects):
-        yield from below(node, (i,), UNMOVED, DEFAULT_MATERIAL, True)
-
-
-def same_place(a: Leaf, b: Leaf) -> bool:
-    """Whether two leaves stand under the same matrix."""
-    return a.matrix is b.matrix or a.matrix.tobytes() == b.matrix.tobytes()
+        return iter(walk(self.objects, TOP, Names(self.definitions, self.materials)).leaves)
 
 
 def one_of(what: str, names) -> str:
@@ -378,6 +347,7 @@ def one_of(what: str, names) -> str:
     return f"the name of a {what}: " + (", ".join(sorted(names)) or "there are none")
 
 
-DEFAULT_MATERIAL = Material()
 UNMOVED = np.eye(4)
 UNMOVED.flags.writeable = False
+DEFAULT_MATERIAL = Material()
+TOP = Leaf((), None, UNMOVED, DEFAULT_MATERIAL, True)     # what objects take from above

@@ -16,7 +16,8 @@ from rtcore.lanes import (LANES, any_lane, bits, exceeds, fill, greatest, load, 
 from rtcore.neighbours import consecutive, copy, copy_twice, count_up, load1, store1, store_by_turns
 from rtcore.powers import floor
 from rtcore.latest import Latest
-from rtcore.scene import Background, Leaf, Material, invertible
+from rtcore.leaves import Leaf
+from rtcore.scene import Background, Material, invertible
 from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
 
 # columns of Look.material

@@ -9,14 +9,14 @@ MODULES = {".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix("
            for folder in ("rtcore", "app", "resources") for path in sorted((ROOT / folder).rglob("*.py"))}
 
 WINDOW = {"PySide6", "shiboken6", "pyqtgraph", "app"}
-DOCUMENT = {"rtcore.fields", "rtcore.camera", "rtcore.scene"}      # what describes a scene; nothing in it is compiled
+DOCUMENT = {"rtcore.fields", "rtcore.camera", "rtcore.leaves", "rtcore.scene"}      # what describes a scene; nothing in it is compiled
 COMPILED = {"numba", "llvmlite"}
 
 #: A module may import from its own layer and from those above it. A name stands for all below it.
 LAYERS = (
     {"rtcore.fields"},
     {"rtcore.camera"},
-    {"rtcore.scene"},
+    {"rtcore.leaves", "rtcore.scene"},
     {"rtcore.latest"},
     {"rtcore.across", "rtcore.directions", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.jit", "rtcore.lanes",
      "rtcore.neighbours", "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},

@@ -8,7 +8,8 @@ import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.lights import SAMPLED, Ambient, Point
-from rtcore.scene import Leaf, Light, Material, Scene, Shape
+from rtcore.leaves import Leaf
+from rtcore.scene import Light, Material, Scene, Shape
 from rtcore.shapes import Box, Cone, Cylinder, Mesh, Plane, Polygon, Sphere, Torus, Triangle
 
 
