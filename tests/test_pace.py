@@ -58,6 +58,7 @@ def test_every_pixel_is_in_one_tile_of_one_lattice(first):
     assert passes(False) == [Pass(1, False, range(1))]
 
 
+@pytest.mark.alone
 def test_the_first_picture_comes_in_time_and_shows_all_of_the_view():
     scene, renderer, late, shown = Scene(objects=[Sphere((0, 0, 0), 1)]), Renderer(keep=True), [], []
     for turn in range(12):

@@ -11,6 +11,7 @@ sys.path.insert(0, str(HERE))
 from display import missing_tools  # noqa: E402
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(bool(missing_tools()), reason=f"not installed: {', '.join(missing_tools())}")
 @pytest.mark.timeout(900)
 def test_the_window_is_driven_for_real(tmp_path):
@@ -18,6 +19,7 @@ def test_the_window_is_driven_for_real(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(bool(missing_tools()), reason=f"not installed: {', '.join(missing_tools())}")
 @pytest.mark.timeout(900)
 def test_a_picture_of_the_new_view_is_on_the_screen_in_time(tmp_path):

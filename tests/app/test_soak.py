@@ -10,6 +10,7 @@ HERE = Path(__file__).parent
 SECONDS = float(os.environ.get("RAYSCOPE_SOAK", "8"))
 
 
+@pytest.mark.alone
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads what Linux tells of a thread's time")
 @pytest.mark.timeout(SECONDS + 580)
 def test_the_window_answers_whatever_is_done(tmp_path):
