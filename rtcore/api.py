@@ -19,7 +19,7 @@ from rtcore.progressive import Renderer, RenderRequest
 from rtcore.scene import Scene
 from rtcore.settings import Settings
 from rtcore.trace import CLOSEST
-from rtcore.wave import GX, OPAQUE, RAY_ROWS, SURFACE_ROWS, U, Rays, new_rays, padded
+from rtcore.wave import GX, OPAQUE, RAY_ROWS, SURFACE_ROWS, U, Rays, new_rays, new_tally, padded
 
 CHUNK = 1 << 13     # rays traced in one go: their arrays stay in the second-level cache
 KEPT = 4            # scenes and precisions whose geometry is kept for the next query
@@ -237,9 +237,9 @@ class Query:
 def _chunks(spans: list[tuple[int, int]], dtype) -> list[Rays]:
     """Rays for every chunk, with nothing set, all in the same few blocks of memory: a system is slow to give many."""
     most = padded(max((b - a for a, b in spans), default=0))
-    kinds = (((RAY_ROWS, most), dtype), ((most,), np.int32), ((most,), np.int32), ((most,), np.uint8), ((2,), np.int64))
+    kinds = (((RAY_ROWS, most), dtype), ((most,), np.int32), ((most,), np.int32), ((most,), np.uint8))
     blocks = [np.empty((len(spans), *shape), kind) for shape, kind in kinds]
-    return [Rays(*parts) for parts in zip(*blocks)]
+    return [Rays(*parts, new_tally()) for parts in zip(*blocks)]
 
 
 def _bound(value, name: str, n: int) -> np.ndarray:

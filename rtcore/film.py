@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.across import count
+from rtcore.indices import among
 from rtcore.jit import inline, kernel
-from rtcore.lanes import LANES, exceeds, fill, load, load3, narrow, select, store, wide
-from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, store1, store_triples, turns
+from rtcore.lanes import LANES, bits, exceeds, fill, load, load3, narrow, select, store, wide
+from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, load_flat, store1, store_flat, store_triples, turns
 from rtcore.sampling import REPLICATES
 from rtcore.wave import DEPTH_UNIT, NX, T
 
@@ -201,8 +202,18 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
     """Rows first .. last - 1 of the mean picture, pixels (h, w, 3) float32, and which leaf each pixel shows and how far away; leaf: that of
     each primitive. A pixel without a sample shows that of the lattice before it."""
     for y in range(first, last):
-        for x in range(width):
+        x = 0
+        while x < width:
             p, step = y * width + x, 1
+            c = film.count[p]
+            if c > 0 and x + LANES <= width and bits(among(film.count, p, c, c + 1)) == 255:
+                for k in range(0, 3 * LANES, LANES):
+                    store_flat(pixels, 3 * p + k, narrow(load_flat(film.total, 3 * p + k) / np.float64(c)))
+                store_flat(distance, p, load1(film.distance, p))
+                for k in range(LANES):
+                    node[y, x + k] = leaf[film.prim[p + k]] if film.prim[p + k] >= 0 else -1
+                x += LANES
+                continue
             while film.count[p] == 0 and step < spacing:
                 step *= 2
                 p = y // step * step * width + x // step * step
@@ -211,6 +222,7 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
                 pixels[y, x, k] = film.total[p, k] / c if c > 0 else 0.0
             node[y, x] = leaf[film.prim[p]] if c > 0 and film.prim[p] >= 0 else -1
             distance[y, x] = film.distance[p] if c > 0 else np.inf
+            x += 1
 
 
 @kernel

@@ -88,6 +88,27 @@ def store1(tc, array, i, x):
 
 
 @intrinsic
+def load_flat(tc, array, i):
+    """Eight floats of a C-contiguous array, from the i-th in memory."""
+    v = LANES_OF[array.dtype]
+
+    def gen(ctx, b, sig, a):
+        start = b.gep(ctx.make_array(array)(ctx, b, a[0]).data, [a[1]])
+        return b.load(b.bitcast(start, ir.VectorType(REAL[v.elem], LANES).as_pointer()), align=4)
+    return v(array, types.intp), gen
+
+
+@intrinsic
+def store_flat(tc, array, i, x):
+    """The same, to be written."""
+    def gen(ctx, b, sig, a):
+        start = b.gep(ctx.make_array(array)(ctx, b, a[0]).data, [a[1]])
+        b.store(a[2], b.bitcast(start, a[2].type.as_pointer()), align=4)
+        return ctx.get_dummy_value()
+    return types.void(array, types.intp, x), gen
+
+
+@intrinsic
 def turns(tc, array, i):
     """1 where the int32 array[i + k] is even, -1 where it is odd, as float32 lanes."""
     def gen(ctx, b, sig, a):

@@ -23,8 +23,10 @@ from rtcore.schedule import COARSEST, FURTHER, TILE, Pass, further, passes, tile
 from rtcore.settings import Settings
 from rtcore.trace import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW, Scratch, Tracer
 from rtcore.views.view import Seen
+from rtcore.wave import UNWANTED
 
 PARTIAL = 0.25      # seconds after which a long pass shows what it has
+LOOK = 0.005        # seconds between two looks whether a pass is still wanted
 SHOWN = 2.0         # how much longer it takes until a frame is on the screen than until it is made
 
 
@@ -96,6 +98,7 @@ class Render:
         self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit, signed)
         if not reused and self.memory is not None:
             self.memory.forget_film()
+        self.fresh = not goes_on        # the film was empty
         if reused and not goes_on:
             films.clear(self.film)
         if before is not None and len(before.scratches) == threads and before.tracer.geometry.dtype == geometry.dtype:
@@ -113,7 +116,7 @@ class Render:
         numbers: dict[int, int] = {}
         self.materials = np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in geometry.leaves], np.int32)
         self.order: np.ndarray | None = None
-        self.spent = 0.0        # samples per pixel of whole passes
+        self.spent = float(self.film.count.mean()) if goes_on else 0.0     # samples per pixel, before the pass under way
         self.converged = False  # nothing is left that could be seen
         self.prepared = time.perf_counter() - (before.elapsed if goes_on else 0.0)
         self.number = 0         # of the pass
@@ -169,22 +172,30 @@ class Render:
         todo, halt = iter(queue), threading.Event()
         # time runs out only once every pixel has a sample
         deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
-        self.done_tiles, self.spent = itertools.count(1), float(self.film.count.mean())
+        self.done_tiles = itertools.count(1)
         began, before = time.perf_counter(), self.counts()
-        patience = PARTIAL if self.number else self.soon
+        shown, patience = began, PARTIAL if self.number else self.soon
 
         def stale() -> bool:
             return halt.is_set() or cancelled() or time.perf_counter() > deadline
 
+        def end() -> None:      # kernels see it within a packet of rays, the threads between kernels
+            halt.set()
+            self._want(False)
+
         self.tracing, self._squared = True, None
+        self._want(True)
         shares = [self.pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
         try:
-            while wait(shares, patience, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
-                self.elapsed, patience = time.perf_counter() - self.prepared, PARTIAL
-                yield
+            while wait(shares, LOOK, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
+                if cancelled():
+                    end()
+                elif (now := time.perf_counter()) - shown >= patience:
+                    self.elapsed, shown, patience = now - self.prepared, now, PARTIAL
+                    yield
         finally:
             if not all(share.done() for share in shares):
-                halt.set()
+                end()
             wait(shares)
             self.tracing = False
             self.elapsed = time.perf_counter() - self.prepared
@@ -192,12 +203,16 @@ class Render:
         self.finished = all(results)
         if one.samples == range(1):
             pixels = (share if self.finished else (next(self.done_tiles) - 1) * each) * size[0] * size[1]
-            if self.film.count.max(initial=0) <= 1:     # or the samples were there, and tiles were skipped
+            if self.fresh or self.film.count.max() <= 1:    # else the samples were there, and tiles were skipped
                 self._note_pace(one.spacing, pixels, (time.perf_counter() - began) * len(shares), self.counts() - before)
-        if self.finished:
-            self.spent = float(self.film.count.mean())
-            if one.spacing == 1 and one.pixels is None and one.region is None:
-                self.samples = one.samples.stop
+        self.spent = float(self.film.count.mean())
+        if self.finished and one.spacing == 1 and one.pixels is None and one.region is None:
+            self.samples = one.samples.stop
+
+    def _want(self, on: bool) -> None:
+        """Tell the kernels whether what they trace is wanted."""
+        for scratch in self.scratches:
+            scratch.tally[UNWANTED] = not on
 
     def _note_pace(self, spacing: int, pixels: float, seconds: float, counts: np.ndarray) -> None:
         """So many pixels of lattices took so long, and so many rays."""
@@ -326,6 +341,6 @@ class Render:
             error=lambda: np.sqrt(self.squared_errors()).reshape(height, width),
             coordinates=lambda: spread(self.recast.coordinates(film, share)), tests=lambda: spread(self.recast.tests(film, share))))
         self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
+        mean = float(film.count.mean()) if self.tracing else self.spent
         return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
-                     self.rays(), self.elapsed, done, self.plan, self.seconds(), float(self.film.count.mean()), self.error(),
-                     self.converged, self.held())
+                     self.rays(), self.elapsed, done, self.plan, self.seconds(), mean, self.error(), self.converged, self.held())

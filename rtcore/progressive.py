@@ -29,6 +29,7 @@ from rtcore.scene import Scene
 from rtcore.schedule import COARSEST, LATTICES, passes, tiles
 from rtcore.settings import Settings
 from rtcore.trace import NONFINITE
+from rtcore.wave import COUNTED
 
 KNOWN = 0.08        # seconds that a picture of known hits may take and still come whole, not lattice by lattice
 MARGIN = 1e-5       # by which boxes are made larger, of their corners' coordinates: shapes are rounded to float32
@@ -207,7 +208,7 @@ class Renderer:
         settings = render.settings
         count = render.film.count
         samples = {"least": int(count.min()), "mean": round(float(count.mean()), 3), "most": int(count.max())}
-        slow, uncertified = (int(x) for x in sum(scratch.tally() for scratch in render.scratches))
+        slow, uncertified = (int(x) for x in sum(scratch.tally[COUNTED] for scratch in render.scratches))
         traced = sum(count for name, count in render.rays().items() if not name.endswith("hits"))
         left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
         return {"size": list(settings.size), "samples_per_pixel": samples["mean" if render.adaptive else "least"], "samples": samples,

@@ -20,7 +20,7 @@ from rtcore.scene import Background, Fog, Light
 from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
 from rtcore.shapes import DOUBTFUL
-from rtcore.wave import NO_ANSWER, Beam, Wave, find_kinds, new_beam, new_wave, padded
+from rtcore.wave import COUNTED, NO_ANSWER, Beam, Wave, find_kinds, new_beam, new_tally, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
 LEVEL = 1 << 12         # pairs of dimensions for the lights of one depth: so a light more changes nothing about the others
@@ -82,26 +82,24 @@ class Scratch:
         self.dtype = dtype
         self.counts = np.zeros(len(COUNTS), np.int64)
         self.clock = Clock()
-        self.tallied = np.zeros(2, np.int64)        # of waves since replaced by larger ones
-        self.waves = [new_wave(0, dtype), new_wave(0, dtype)]
+        self.tally = new_tally()                    # of all waves
+        self.waves = [new_wave(0, dtype, self.tally), new_wave(0, dtype, self.tally)]
         self.paths: list[np.ndarray] = []           # by level, see `gloss.roughen`
-        self.beam = new_beam(0, 0, dtype)
+        self.beam = new_beam(0, 0, dtype, self.tally)
         self.target = self.number = self.zeros = np.zeros(0, np.int32)
         self.sample, self.signs = np.zeros((3, 0), np.float32), np.zeros(0, np.float32)
 
     def renew(self) -> None:
         """Count from nothing, for another picture."""
-        self.counts, self.clock, self.tallied = np.zeros(len(COUNTS), np.int64), Clock(), np.zeros(2, np.int64)
-        for rays in (self.beam.rays, *(wave.rays for wave in self.waves)):
-            rays.tally[:] = 0
+        self.counts, self.clock = np.zeros(len(COUNTS), np.int64), Clock()
+        self.tally[COUNTED] = 0
 
     def wave(self, level: int, n: int) -> Wave:
         """The wave of a bounce, with room for n rays. It takes the place of that before the one it comes from: what has not been touched
         yet costs 2 us a page, which for a first picture was half its time."""
         which = level % len(self.waves)
         if self.waves[which].owner.shape[0] < n:
-            self.tallied += self.waves[which].rays.tally
-            self.waves[which] = new_wave(n * 5 // 4, self.dtype)
+            self.waves[which] = new_wave(n * 5 // 4, self.dtype, self.tally)
         return self.waves[which]
 
     def path(self, level: int, n: int) -> np.ndarray:
@@ -130,15 +128,10 @@ class Scratch:
         """Bytes of all waves and of what belongs to them."""
         return nbytes((self.waves, self.paths, self.beam, self.target, self.number, self.zeros, self.sample, self.signs))
 
-    def tally(self) -> np.ndarray:
-        """What the intersection kernels counted: rays solved the slow way, hits without a proof."""
-        return sum((wave.rays.tally for wave in self.waves), self.tallied + self.beam.rays.tally)
-
     def beams(self, n: int, lights: int):
         """A beam with room for shadow rays from n hits toward so many lights."""
         if self.beam.answer.shape[1] < n or self.beam.owner.shape[0] < padded(n) * lights + LANES:
-            self.tallied += self.beam.rays.tally
-            self.beam = new_beam(n * 5 // 4, lights, self.dtype)
+            self.beam = new_beam(n * 5 // 4, lights, self.dtype, self.tally)
         return self.beam
 
 

@@ -20,7 +20,7 @@ from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, loa
 from rtcore.pyramid import (ACTIVE, ALIVE, AXIS, BEAM_FROM, BEAM_TO, ENTER, FARTHEST, FROM, HIGHS, INVERSE, LEAVE, LOWS, MODE, OCTANT,
                             REACH, RUNNING, SIGN, SLOPE_FROM, SLOPE_TO, TOP, WAITING, WAY, bundle, common)
 from rtcore.turns import empty_sets, joined, keep, octets, prefetch_either, push
-from rtcore.wave import DX, OX, START, T
+from rtcore.wave import DX, OX, START, UNWANTED, T
 
 PACKET = 64
 GROUPS = PACKET // 8
@@ -67,15 +67,15 @@ def new_walk(rays):
 
 @inline
 def begin(walk, rays, start, n, tree, singly):
-    """Bring the packet of rays start .. min(start + 64, n) to the tree's root. singly: how many nodes a tree must have for rays
-    that scatter to be walked singly, which costs less where nodes come from memory."""
+    """Bring the packet of rays start .. min(start + 64, n) to the tree's root; none of them once they are not wanted any more. singly: how
+    many nodes a tree must have for rays that scatter to be walked singly, which costs less where nodes come from memory."""
     eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
     frame, coarse, fine, state, box = tree.frame, walk.coarse, walk.fine, walk.state, tree.box
     alone = box.shape[0] > 0 and tree.link[LINK, 0] < 0 and box[0, 1] > box[3, 1]
     # the box that rays are tested against: the only leaf's, or the frame itself
     l0, l1, l2 = (box[0, 0], box[1, 0], box[2, 0]) if alone else (-ONE, -ONE, -ONE)
     h0, h1, h2 = (box[3, 0], box[4, 0], box[5, 0]) if alone else (ONE, ONE, ONE)
-    groups = min(GROUPS, (n - start + 7) // 8)
+    groups = min(GROUPS, (n - start + 7) // 8) if rays.tally[UNWANTED] == 0 else 0
     alive, waiting = 0, 0
     two = splat(np.float32(2))
     x0, y0, z0, x1, y1, z1 = two, two, two, -two, -two, -two

@@ -28,8 +28,10 @@ OPAQUE = 1 << 24
 DEPTH_UNIT = 2.0 ** -16
 
 
-#: Places in Rays.tally: rays that were sent to a slow exact solver, hits recorded without a proof.
-SLOW, UNCERTIFIED = 0, 1
+#: Places in Rays.tally: rays that were sent to a slow exact solver, hits recorded without a proof, and whether (not 0) the answers are not
+#: wanted any more, which kernels that walk a tree see after each packet.
+SLOW, UNCERTIFIED, UNWANTED = range(3)
+COUNTED = slice(UNWANTED)
 
 
 class Rays(NamedTuple):
@@ -39,7 +41,7 @@ class Rays(NamedTuple):
     prim: np.ndarray    # int32 (n): the primitive hit, -1 none
     depth: np.ndarray   # int32 (n): optical depth met so far; shadow waves only
     doubt: np.ndarray   # uint8 (n): 1 where the hit is not certified; means something only for primitives of kinds that can doubt
-    tally: np.ndarray   # int64 (2): what the kernels count, SLOW and UNCERTIFIED
+    tally: np.ndarray   # int64 (3): as named above; several waves may share one
 
 
 def padded(n: int) -> int:
@@ -55,18 +57,23 @@ def _carved(*wanted: tuple) -> list[np.ndarray]:
     return [piece[end - size:end].view(dtype)[:math.prod(shape)].reshape(shape) for (shape, dtype), size, end in zip(wanted, sizes, ends)]
 
 
+def new_tally() -> np.ndarray:
+    """Nothing counted yet."""
+    return np.zeros(3, np.int64)
+
+
 def new_rays(n: int, dtype) -> Rays:
     """Rays for `n` rays, with nothing set."""
-    return _cleared(*_carved(*_rays(padded(n), dtype)))
+    return _cleared(*_carved(*_rays(padded(n), dtype)), new_tally())
 
 
 def _rays(n: int, dtype) -> tuple:
     return ((RAY_ROWS, n), dtype), ((n,), np.int32), ((n,), np.int32), ((n,), np.uint8)
 
 
-def _cleared(ray: np.ndarray, prim: np.ndarray, depth: np.ndarray, doubt: np.ndarray) -> Rays:
+def _cleared(ray: np.ndarray, prim: np.ndarray, depth: np.ndarray, doubt: np.ndarray, tally: np.ndarray) -> Rays:
     doubt.fill(0)
-    return Rays(ray, prim, depth, doubt, np.zeros(2, np.int64))
+    return Rays(ray, prim, depth, doubt, tally)
 
 
 @inline
@@ -145,21 +152,21 @@ GLOSS, POLISH, ANSWER_ROWS = 3, 4, 5
 NO_ANSWER = np.zeros((ANSWER_ROWS, 0), np.float32)      # where there is no light to answer
 
 
-def new_wave(n: int, dtype) -> Wave:
+def new_wave(n: int, dtype, tally: np.ndarray | None = None) -> Wave:
     """A wave for `n` rays, with nothing set."""
     n = padded(n)
     *rays, surface, light, weight, fade, owner, source = _carved(
         *_rays(n, dtype), ((SHADING_ROWS, n), dtype), ((3, n), np.float32), ((3, n), np.float32), ((n,), np.float32), ((n,), np.int32),
         ((n,), np.int32))
-    return Wave(_cleared(*rays), surface, light, weight, fade, owner, source)
+    return Wave(_cleared(*rays, new_tally() if tally is None else tally), surface, light, weight, fade, owner, source)
 
 
-def new_beam(n: int, lights: int, dtype) -> Beam:
+def new_beam(n: int, lights: int, dtype, tally: np.ndarray | None = None) -> Beam:
     """A beam with room for rays from `n` hits toward so many lights, with nothing set."""
     n, columns = padded(n), padded(n) * lights + LANES
     *rays, bring, owner, answer = _carved(
         *_rays(columns, dtype), ((3, columns), np.float32), ((columns,), np.int32), ((ANSWER_ROWS, n), np.float32))
-    return Beam(_cleared(*rays), bring, owner, answer)
+    return Beam(_cleared(*rays, new_tally() if tally is None else tally), bring, owner, answer)
 
 
 @inline

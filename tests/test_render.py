@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import rtcore
-from rtcore import (Ambient, Background, Box, Camera, Checker, Cone, Cylinder, Directional, Fog, Material, Mesh, Node, Plane, Point,
-                    Polygon, Scale, Scene, Sphere, Triangle)
+from rtcore import (Ambient, Background, Box, Camera, Checker, Cone, Cylinder, Directional, Fog, Implicit, Material, Mesh, Node, Plane,
+                    Point, Polygon, Scale, Scene, Sphere, Triangle)
+from rtcore.pace import Pace
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.settings import Settings
 
@@ -150,6 +151,7 @@ def heavy() -> Scene:
     return busy(objects=glass, camera=Camera(lookfrom=(0, 0, -12)))
 
 
+@pytest.mark.alone
 def test_a_stale_render_ends_at_once_and_leaves_no_thread():
     scene, before = heavy(), threading.active_count()
     list(frames(scene, size=(16, 16), samples=1))       # kernels loaded
@@ -167,6 +169,30 @@ def test_a_stale_render_ends_at_once_and_leaves_no_thread():
     assert threading.active_count() == before
     # 50 ms is the promise; a busy machine may be late now and then, but not each time
     assert min(waits) < 0.05 and max(waits) < 0.3, waits
+
+
+@pytest.mark.alone
+def test_a_stale_render_ends_in_the_midst_of_a_kernel(monkeypatch):
+    """One tile, one shape, one call of its kernel, which takes much longer than the wait."""
+    monkeypatch.setattr(Pace, "edge", lambda *_: 192)
+    slow = Implicit("sin(30*x*y) + sin(30*y*z) + sin(30*z*x) - 2.99", (-6, -6, -6), (6, 6, 6))
+    scene, waits = Scene(objects=[slow], camera=Camera(lookfrom=(1, 2, -25))), []
+    request = RenderRequest(scene, scene.camera, Settings(size=(192, 192), samples=1, threads=1))
+    list(frames(scene, size=(16, 16), samples=1))       # kernels loaded
+    renderer = Renderer()
+    for _ in range(3):
+        began = time.perf_counter()
+        assert not [f for f in renderer.frames(request, lambda began=began: time.perf_counter() > began + 0.02, coarse=False) if f.done]
+        waits.append(time.perf_counter() - began - 0.02)
+    whole = time.perf_counter()
+    *_, last = renderer.frames(request, coarse=False)
+    assert last.done and time.perf_counter() - whole > 0.1      # and that it had been broken off does no harm
+    fresh = Renderer()
+    *_, again = fresh.frames(request, coarse=False)
+    assert (again.pixels == last.pixels).all() and (again.node >= 0).any()
+    renderer.close()
+    fresh.close()
+    assert min(waits) < 0.02, waits
 
 
 def test_closing_the_iterator_ends_the_threads_work():

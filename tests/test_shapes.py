@@ -13,8 +13,11 @@ import pytest
 import rtcore
 from rtcore import (Blob, Box, Cone, Cylinder, Implicit, Matrix, Mesh, Node, Plane, Polygon, Polyhedron, Quadric, Scene, Sphere, Torus,
                     Triangle)
-from rtcore.shapes import SHAPES
+from rtcore.flatten import flatten
 from rtcore.reports.oracle import crossings, mp, nearest, vector
+from rtcore.shapes import SHAPES
+from rtcore.trace import CLOSEST
+from rtcore.wave import DX, OX, START, UNWANTED, T, new_rays
 
 BOUND = 8
 UNIT = {"f64": 2.0 ** -53, "f32": 2.0 ** -24}
@@ -215,3 +218,15 @@ def test_smooth_normals_do_not_bend_the_geometric_one():
     flat = Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0), normals=((1, 0, 1), (0, 1, 1), (-1, 0, 1)))
     hits = rtcore.intersect(Scene(objects=[flat]), [(0.25, 0.25, 1)], [(0, 0, -1)])
     assert hits.normal.tolist() == [[0, 0, 1]] and hits.uv.tolist() == [[0.25, 0.25]]
+
+
+@pytest.mark.parametrize("name", [name for name, shape in EXAMPLES.items() if shape.kind(np.eye(4)).bounds is not None])
+def test_kernels_that_walk_a_tree_leave_off_when_nobody_wants_the_answers(name):
+    rng, (group,) = np.random.default_rng(3), flatten(Scene(objects=[EXAMPLES[name]])).groups
+    o, d = rays_at(rng, np.eye(4), 256, "f64")
+    for wanted in (True, False):
+        rays = new_rays(256, np.float64)
+        rays.ray[OX:OX + 3], rays.ray[DX:DX + 3], rays.ray[START], rays.ray[T], rays.prim[:] = o.T, d.T, 0, np.inf, -1
+        rays.tally[UNWANTED] = not wanted
+        group.kind.intersect(rays, 256, group.tree, group.table, group.first, CLOSEST)
+        assert (rays.prim >= 0).any() == wanted
