@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from app.compiling import Compiler, Compiling
 from app.engine import Engine, Job
@@ -36,6 +36,7 @@ class Worker(QObject):
     newest = Signal()           # there is a frame to take; sent once until it is taken
     progressed = Signal()       # `compiling` changed
     failed = Signal(str)        # one line; the whole story is on stderr
+    _submitted = Signal()       # comes round when its thread is done with what it is at
 
     def __init__(self, renderer_factory: Callable[[], Engine] = Engine, compiler: Compiler | None = None, parent: QObject | None = None):
         super().__init__(parent)
@@ -47,6 +48,8 @@ class Worker(QObject):
         self._running: Job | None = None
         self._halted: Job | None = None         # stopped by a pause, to be gone on with
         self._paused = self._closing = False
+        self._free = True                       # the window's thread is not in the midst of something
+        self._submitted.connect(self._begin, Qt.ConnectionType.QueuedConnection)
         self._latest: Shown | None = None       # the last frame, whether taken or not; the render thread's own
         self._newest: Shown | None = None
         self._announced = False
@@ -58,13 +61,22 @@ class Worker(QObject):
         self._thread.start()
 
     def submit(self, job: Job):
-        """Render this next; what runs now ends, what waits is forgotten."""
+        """Render this next, once the window's thread comes back to its events: panels that tell of the change would take twice as long to
+        do so if the render thread ran Python meanwhile. What runs now ends, what waits is forgotten."""
         with self._wake:
             self._next = job
             running = self._running
-            self._wake.notify()
+            if self._free:
+                self._free = False
+                self._submitted.emit()
         if self.compiling is not None and running is not None and running.document != job.document:
             self._compiler.kill()
+
+    @Slot()
+    def _begin(self):
+        with self._wake:
+            self._free = True
+            self._wake.notify()
 
     def pause(self, on: bool):
         """Stop refining as soon as every pixel has a sample, and stay so with later jobs; or go on where it was stopped."""
@@ -118,7 +130,8 @@ class Worker(QObject):
     def _await_job(self) -> Job | None:
         with self._wake:
             self._running = None
-            self._wake.wait_for(lambda: self._next is not None or self._closing or (self._halted is not None and not self._paused))
+            self._wake.wait_for(lambda: self._closing or self._free and (
+                self._next is not None or (self._halted is not None and not self._paused)))
             self._running, self._next, self._halted = self._next or self._halted, None, None
             return None if self._closing else self._running
 
