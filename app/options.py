@@ -4,7 +4,7 @@ from typing import Annotated
 import msgspec
 
 from rtcore.fields import Choice, FieldError, Flag, Maybe, Number, Numbers, Record
-from rtcore.settings import FILTER_NAMES, VIEW_NAMES
+from rtcore.settings import FILTER_NAMES, SOLVER_NAMES, VIEW_NAMES
 
 MOST_SAMPLES = 1 << 20      # what the renderer is asked for where no end is set
 
@@ -29,6 +29,8 @@ class Options(Record, frozen=True, kw_only=True):
     max_depth: Annotated[int, Number(least=1, most=64, help="longest chain of rays, the eye's included")] = 5
     threads: Annotated[int, Number(least=0, most=256, help="threads that trace; 0 takes every core")] = 0
     precision: Annotated[str, Choice(words=("f64", "f32"), help="float type of the shapes' arithmetic")] = "f64"
+    solver: Annotated[str, Choice(words=SOLVER_NAMES, help="how hits are found: for certain, or on spheres by the textbook's b² − 4ac, "
+                                  "which fails far away")] = "certain"
     seed: Annotated[int, Number(least=0, most=2**31 - 1, help="start of the random sequence; the same seed gives the same picture")] = 0
 
     def check(self):
@@ -54,4 +56,4 @@ class Options(Record, frozen=True, kw_only=True):
         return {"shadows": self.shadows, "fog": self.fog, "reflections": self.reflections, "view": self.view,
                 "adaptive": self.adaptive, "samples": int(self.samples or MOST_SAMPLES), "seconds": self.seconds, "error": self.error,
                 "filter": self.filter, "max_depth": int(self.max_depth), "threads": int(self.threads), "precision": self.precision,
-                "seed": int(self.seed)}
+                "solver": self.solver, "seed": int(self.seed)}

@@ -23,7 +23,8 @@ def render(job: Job, samples: int, cancelled: Callable[[], bool], progress: Call
     from rtcore.reports.convergence import refer
     from rtcore.settings import Settings
     from rtcore.warm import missing
-    settings = Settings(size=job.size, **{**job.options.settings(), "view": "beauty", "precision": "f64", "samples": samples})
+    best = {"view": "beauty", "precision": "f64", "solver": "certain", "samples": samples}
+    settings = Settings(size=job.size, **{**job.options.settings(), **best})
     if names := missing(job.scene, settings, camera=job.camera):
         compiler.compile(names, lambda state: None)
     renderer, found = Renderer(), None

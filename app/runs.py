@@ -18,7 +18,7 @@ SILENT = ("view", "scale")      # another view of the same run; the scale shows 
 
 
 class Subject(NamedTuple):
-    """What a reference can be compared with: all that the finished picture depends on, but for samples and precision."""
+    """What a reference can be compared with: all that the finished picture depends on, but for samples, precision and solver."""
 
     scene: Scene
     camera: Camera

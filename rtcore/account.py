@@ -61,7 +61,8 @@ def account(plan: Plan, seconds: Mapping[tuple[str, str], float], held: Mapping[
 def _within(stage: str) -> str:
     if stage.startswith("tree: "):
         return stage.replace("tree", "hits")
-    return {"smooth normals": "surface at the hits", "patterns": "ambient and other light", "further samples": "all stages"}.get(stage, "")
+    return {"smooth normals": "surface at the hits", "patterns": "ambient and other light", "further samples": "all stages",
+            "textbook formulas": "hits: sphere"}.get(stage, "")
 
 
 def plural(kind: str) -> str:

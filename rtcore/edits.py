@@ -45,7 +45,7 @@ EDITS = (
     Edit("hide", "a shape hidden or shown", TOUCHED, TOUCHED, TOUCHED, ANEW),
     Edit("shape", "a shape's numbers or its place", TOUCHED, TOUCHED, TOUCHED, ANEW),
     Edit("nodes", "shapes added, deleted or put in another order", ANEW, ANEW, ANEW, ANEW),
-    Edit("camera", "the view; size, precision, seed of the picture", ANEW, ANEW, ANEW, ANEW),
+    Edit("camera", "the view; size, precision, solver, seed of the picture", ANEW, ANEW, ANEW, ANEW),
 )
 EDIT = {edit.name: edit for edit in EDITS}
 

@@ -36,6 +36,7 @@ class Plan(NamedTuple):
     lens: bool
     gloss: bool
     filter: bool            # other than a box
+    textbook: bool          # formulas where there is a kernel of them
     samples: int                    # per pixel
 
 
@@ -73,6 +74,9 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
             stages.append(f"tree: {kind.name}")
     if counts:
         stages.append("surface at the hits")
+    plain = [kind.name for kind in counts if kind.textbook is not None]
+    textbook = _keep(stages, out, "textbook formulas", [
+        (settings.solver == "textbook", "hits are to be certain"), (plain, "no visible shape is solved by one")])
 
     given = STUDIO if scene.lights is None else scene.lights
     shining = [light for light in given if light.on and light.intensity > 0 and any(light.color)]
@@ -106,7 +110,7 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
     wanted = {"core": True, "glow": lit, "lens": lens, "samples": "further samples" in stages,
               "doubt": any(kind in DOUBTFUL for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
-              **{kind.name: True for kind in kinds},
+              **{kind.name: True for kind in kinds}, **{f"textbook-{name}": textbook for name in plain},
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss, "filter": shaped,
               "adaptive": "further samples" in stages and (settings.adaptive or "adaptive" in VIEW[settings.view].kernels),
               "recast": "recast" in VIEW[settings.view].kernels}
@@ -114,7 +118,7 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     samples = settings.samples if lit else 1
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, samples)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, textbook, samples)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

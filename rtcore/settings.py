@@ -6,6 +6,7 @@ from rtcore.views import VIEWS
 
 VIEW_NAMES = tuple(view.name for view in VIEWS)
 FILTER_NAMES = ("box", "gaussian", "mitchell")
+SOLVER_NAMES = ("certain", "textbook")
 
 
 class Whole(Field):
@@ -57,6 +58,7 @@ class Settings(Record, frozen=True, kw_only=True):
     region: Annotated[tuple[int, int, int, int] | None, Maybe(inner=Region(help="what gets its samples first"))] = None
     filter: Annotated[str, Choice(words=FILTER_NAMES, help="how what lies about a pixel's centre counts")] = "box"
     precision: Annotated[str, Choice(words=("f64", "f32"), help="of the geometry")] = "f64"
+    solver: Annotated[str, Choice(words=SOLVER_NAMES, help="for certain or, on spheres, by the textbook's formula")] = "certain"
     threads: Annotated[int, Whole(0, 1024, "render threads; 0: one per core")] = 0
     max_depth: Annotated[int, Whole(1, 64, "longest chain of rays, the eye's included")] = 5
     shadows: Annotated[bool, Flag(help="trace shadow rays")] = True

@@ -159,6 +159,7 @@ class Tracer:
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
         self.lamps = [self._lamp(light) for light in plan.lights]
         names = [group.kind.name for group in geometry.groups]
+        self.meet = [settings.solver == "textbook" and group.kind.textbook or group.kind.intersect for group in geometry.groups]
         self.laps = [Laps((f"hits: {name}", name), ("surface at the hits", name), ("shadow rays", name)) for name in names]
         # something asks which sample a ray belongs to
         self.filter = filters.made(settings.filter) if plan.filter else None
@@ -256,6 +257,9 @@ class Tracer:
             for group in self.geometry.groups:
                 if group.kind in DOUBTFUL:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
+                if group.kind.textbook is not None and self.plan.textbook:
+                    prim, last = wave.rays.prim[:n], group.first + len(group.owner)
+                    film.doubt[scratch.target[:n][(group.first <= prim) & (prim < last)]] = 1
         if recall is not None:
             recall.note_film()
         scratch.clock.lap(FILM)
@@ -303,8 +307,8 @@ class Tracer:
                 counts[REFRACTION] -= refracted
                 spared = ONWARD
             clock.lap(spared)
-        for group, laps in zip(self.geometry.groups, self.laps) if known < n else ():
-            self.run(group.kind.intersect, wave.rays, n, group.tree, group.table, group.first, CLOSEST)
+        for group, meet, laps in zip(self.geometry.groups, self.meet, self.laps) if known < n else ():
+            self.run(meet, wave.rays, n, group.tree, group.table, group.first, CLOSEST)
             clock.lap(laps.hits)
             if stale():
                 raise Stale
@@ -377,8 +381,8 @@ class Tracer:
             known = m - sum(recall.shadows(beam, *part) for part in parts)
             blocked = int(np.count_nonzero(beam.rays.prim[:m] >= 0))
             clock.lap(CASTING)
-        for group, laps in zip(self.geometry.groups, self.laps) if known < m else ():
-            self.run(group.kind.intersect, beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
+        for group, meet, laps in zip(self.geometry.groups, self.meet, self.laps) if known < m else ():
+            self.run(meet, beam.rays, m, group.tree, group.table, group.first, self.look.opacity)
             clock.lap(laps.shadows)
             if stale():
                 raise Stale

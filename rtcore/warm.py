@@ -156,15 +156,26 @@ def _light(kind):
     return compile_light
 
 
+def _example(kind, dtype):
+    precision = next(name for name, d in DTYPES.items() if d == dtype)
+    return flatten(Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())]), precision)
+
+
 def _kind(kind):
     def compile_kind(dtype):
         wave, _, n = _wave(dtype)
-        precision = next(name for name, d in DTYPES.items() if d == dtype)
-        scene = Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())])
-        (group,) = flatten(scene, precision).groups
+        (group,) = _example(kind, dtype).groups
         kind.intersect(wave.rays, n, group.tree, group.table, 0, CLOSEST)
         kind.surface(wave.rays, n, wave.surface, group.table, 0)
     return compile_kind
+
+
+def _textbook(kind):
+    def compile_textbook(dtype):
+        wave, _, n = _wave(dtype)
+        (group,) = _example(kind, dtype).groups
+        kind.textbook(wave.rays, n, group.tree, group.table, 0, CLOSEST)
+    return compile_textbook
 
 
 #: Each group: the module whose source it hangs on, and how to compile it for a precision.
@@ -176,6 +187,7 @@ GROUPS: dict[str, tuple[str, Callable]] = {
     "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
     **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
     **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
+    **{f"textbook-{kind.name}": (kind.textbook.py_func.__module__, _textbook(kind)) for kind in KINDS if kind.textbook is not None},
 }
 ALL = tuple(f"{name}.{precision}" for precision in DTYPES for name in GROUPS)
 

@@ -55,6 +55,7 @@ def test_sentences():
         "tested).",
         "Depth of field is left out: the camera is a pinhole.",
         "Pixel filter is left out: with a box, samples lie evenly in their pixel.",
+        "Textbook formulas are left out: hits are to be certain.",
         "Smooth normals are left out: no mesh brings normals.",
         "Patterns are left out: no visible material has one.",
         "Fog is left out: the scene has none.",

@@ -115,6 +115,7 @@ USAGE = [
     (("-o", "a.png", "--threads", "-2"), "argument --threads: expected a whole number from 0 to 1024, got -2"),
     (("-o", "a.png", "--max-depth", "0"), "argument --max-depth: expected a whole number from 1 to 64, got 0"),
     (("-o", "a.png", "--filter", "lanczos"), "argument --filter: expected one of box, gaussian, mitchell"),
+    (("-o", "a.png", "--solver", "newton"), "argument --solver: expected one of certain, textbook, got 'newton'"),
     (("-o", "a.png", "--view", "beuaty"), "argument --view: expected one of beauty,"),
     (("-o", "a.png", "--sise", "1x1"), "unrecognized arguments: --sise 1x1"),
     ((), "the following arguments are required: -o/--output"),

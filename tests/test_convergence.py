@@ -45,8 +45,8 @@ def test_without_qt_there_are_tables_and_a_line(scene, run, monkeypatch):
     assert Path("out/convergence.md").is_file() and not Path("out/convergence.png").exists()
 
 
-WRONG = [(("--methods", "uniform,fast"), "argument --methods: expected some of uniform, adaptive, f32, f64, got 'fast'"),
-         (("--methods", ""), "argument --methods: expected some of uniform, adaptive, f32, f64, got ''"),
+WRONG = [(("--methods", "uniform,fast"), "argument --methods: expected some of uniform, adaptive, f32, f64, textbook, got 'fast'"),
+         (("--methods", ""), "argument --methods: expected some of uniform, adaptive, f32, f64, textbook, got ''"),
          (("--reference-spp", 4), "argument --reference-spp: expected a whole number from 8 to 1048576, got 4"),
          (("--budget", 0), "argument --budget: expected a number greater than 0, got 0.0"),
          (("--budget", "nan"), "argument --budget: expected a number greater than 0, got nan"),

@@ -37,6 +37,7 @@ VARIANTS = {
     "no answer": (scene(Node(shape=Sphere((0, 0, 0), 1), material=Material(diffuse=0))), {}), "fog off": (scene(fog=Fog(on=False)), {}),
     "switched off": (full(), {"shadows": False, "fog": False, "reflections": False}), "shallow": (full(), {"max_depth": 1}),
     "hidden": (scene(Node(shape=Sphere((0, 0, 0), 1), material=MIRROR, visible=False)), {}),
+    "by the textbook": (full(), {"solver": "textbook"}),
     **{f"view {view.name}": (full(), {"view": view.name}) for view in VIEWS},
 }
 
@@ -51,8 +52,8 @@ def test_every_stage_is_kept_or_left_out_with_a_reason(name):
     assert all(why and why[0].islower() or why[0].isdigit() for _, why in result.left_out)
     assert set(result.kernels) <= set(ALL)
     assert {stage for stage in (*result.stages, *left) if stage.startswith("hits: ")} == {f"hits: {kind.name}" for kind in KINDS}
-    for stage in ("pixel filter", "depth of field", "shadow rays", "smooth normals", "patterns", "fog", "reflected and refracted rays",
-                  "glossy reflection", "further samples"):
+    for stage in ("textbook formulas", "pixel filter", "depth of field", "shadow rays", "smooth normals", "patterns", "fog",
+                  "reflected and refracted rays", "glossy reflection", "further samples"):
         assert (stage in result.stages) != (stage in left)
     stats = rtcore.render(made, (8, 6), **{"spp" if k == "samples" else k: v for k, v in settings.items()}).stats
     assert stats["stages"] == list(plan(made, Settings(**{"samples": 1, **settings})).stages)
@@ -63,7 +64,7 @@ def test_reasons_are_the_right_ones():
         f"tree: {kind.name}": "they are unbounded" if kind.bounds is None else "only 1: each is tested"
         for kind in KINDS if kind.name not in ("sphere", "triangle")} | {
             "depth of field": "the camera is a pinhole", "pixel filter": "with a box, samples lie evenly in their pixel",
-            "glossy reflection": "no visible material is rough and reflects or transmits"}
+            "glossy reflection": "no visible material is rough and reflects or transmits", "textbook formulas": "hits are to be certain"}
     off = dict(plan(*(VARIANTS["switched off"][0], Settings(shadows=False, fog=False, reflections=False))).left_out)
     assert off["shadow rays"] == off["fog"] == off["reflected and refracted rays"] == "switched off"
     bare = dict(plan(scene(), Settings(max_depth=1)).left_out)

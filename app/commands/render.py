@@ -47,6 +47,7 @@ def arguments(parser: Parser) -> None:
                         help="put the samples where the error is (default: with --time and --error); --spp is then their mean")
     parser.add_argument("--filter", metavar="NAME", help="pixel filter: box (the default), gaussian or mitchell")
     parser.add_argument("--precision", metavar="f32|f64", help="float type of the geometry (default f64)")
+    parser.add_argument("--solver", metavar="NAME", help="how hits are found: certain (the default) or textbook: spheres by b² - 4ac")
     parser.add_argument("--threads", metavar="N", type=whole, help="render threads (default: one per core)")
     parser.add_argument("--max-depth", metavar="N", type=whole, help="longest chain of rays, the eye's included (default 5)")
     parser.add_argument("--no-shadows", action="store_true", help="trace no shadow rays")
@@ -64,8 +65,8 @@ def run(args, parser: Parser) -> int:
     adaptive = args.adaptive if args.adaptive is not None else args.time is not None or args.error is not None
     settings = settings_from(
         parser, size=args.size, samples=samples, adaptive=adaptive, seconds=args.time, error=args.error, filter=args.filter,
-        precision=args.precision, threads=args.threads, max_depth=args.max_depth, shadows=not args.no_shadows, fog=not args.no_fog,
-        reflections=not args.no_reflections, view=args.view, seed=args.seed)
+        precision=args.precision, solver=args.solver, threads=args.threads, max_depth=args.max_depth, shadows=not args.no_shadows,
+        fog=not args.no_fog, reflections=not args.no_reflections, view=args.view, seed=args.seed)
     _check_outputs(args)
     enough_memory(*settings.size)
 

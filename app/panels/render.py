@@ -12,7 +12,7 @@ from app.session import Session
 
 WHOLE = ("max_depth", "threads", "seed")
 SEEN, ENDS = ("view", "exposure", "scale"), ("samples", "seconds", "error")
-HOW = ("adaptive", "filter", "max_depth", "threads", "precision", "seed")
+HOW = ("adaptive", "filter", "max_depth", "threads", "precision", "solver", "seed")
 
 
 class RenderPanel(Panel):

@@ -21,7 +21,8 @@ from rtcore.scene import Scene
 from rtcore.settings import Settings
 
 #: What a method's name sets; several can be joined: "adaptive+f32".
-METHODS = {"uniform": {"adaptive": False}, "adaptive": {"adaptive": True}, "f32": {"precision": "f32"}, "f64": {"precision": "f64"}}
+METHODS = {"uniform": {"adaptive": False}, "adaptive": {"adaptive": True}, "f32": {"precision": "f32"}, "f64": {"precision": "f64"},
+           "textbook": {"solver": "textbook"}}
 RUNS = 2                # of each method, with seeds of their own
 PARTS = 4               # renders that the reference is the mean of
 REFERENCE_SEED = 0x5EED_0000
@@ -83,8 +84,8 @@ def refer(renderer: Renderer, scene: Scene, camera: Camera, settings: Settings, 
     total, errors = 0.0, []
     for part in range(PARTS):
         seed = (REFERENCE_SEED + part) ^ settings.seed
-        chosen = msgspec.structs.replace(settings, samples=each, seed=seed, precision="f64", adaptive=False, seconds=None, error=None,
-                                         view="beauty")
+        chosen = msgspec.structs.replace(settings, samples=each, seed=seed, precision="f64", solver="certain", adaptive=False, seconds=None,
+                                         error=None, view="beauty")
         for frame in renderer.frames(RenderRequest(scene, camera, chosen), cancelled, coarse=False):    # noqa: B007 -- the last one
             yield Step((part + renderer.progress) / PARTS, "reference")
         if cancelled():

@@ -55,6 +55,7 @@ class Kind:
     leaf_most: int = 4
     lasting: bool = False               # its surface rows take far longer than looking them up: the live picture keeps them
     shared_extra: bool = False          # extra is no row per primitive: data's last two columns are its first row and its length
+    textbook: Callable | None = None    # as `intersect`, by the formula of a first course in plain floats, to be compared with
 
 
 # --- unit shapes placed by a matrix ---

@@ -20,6 +20,7 @@ from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import LANES, any_lane, bits, dot, load, load3, rounded, size, splat3, vec3, wide
 from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
+from rtcore.shapes import _textbook
 from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
 from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs, noise_here
 from rtcore.shapes._surface import extent_of, hits_from, new_room, put_all_placed, put_globe, put_surfaces, unit_hits
@@ -277,5 +278,6 @@ def _bounds_ellipsoid(data, extra):
     return placed_bounds(data, np.sqrt((forward(data) ** 2).sum(2)))
 
 
-SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()))
-ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, (Sphere((0, 0, 0), 1), (Scale((1, 2, 3)),)))
+SPHERE = Kind("sphere", intersect, surface, _bounds, (Sphere((0, 0, 0), 1), ()), textbook=_textbook.intersect_sphere)
+ELLIPSOID = Kind("ellipsoid", intersect_ellipsoid, surface_ellipsoid, _bounds_ellipsoid, (Sphere((0, 0, 0), 1), (Scale((1, 2, 3)),)),
+                 textbook=_textbook.intersect_ellipsoid)

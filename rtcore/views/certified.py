@@ -1,4 +1,5 @@
-"""Where the first hit is proven: the picture in grey, orange where a formula's root, or that there is none, was not certified."""
+"""Where the first hit is proven: the picture in grey, orange where a formula's root, or that there is none, was not certified, and where a
+textbook's formula found it."""
 import numpy as np
 
 from rtcore.views.view import View
@@ -13,5 +14,5 @@ def draw(seen):
     return shown
 
 
-CERTIFIED = View("certified", "which hits on formulas are certified; orange ones are not", draw, needs_light=True,
+CERTIFIED = View("certified", "which hits are certain; orange ones are not", draw, needs_light=True,
                  kernels=("recast",))

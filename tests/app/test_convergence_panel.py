@@ -228,4 +228,6 @@ def test_names_and_tables(session, settled):
     assert names(runs) == ["adaptive (1)", "adaptive (2)"] and names([]) == []
     runs[1].job = job._replace(camera=orbit(job.camera, 0.1, 0), size=(32, 24))
     assert names(runs) == ["160 × 120, view 1", "32 × 24, view 2"]
+    solvers = [Run(job._replace(options=msgspec.structs.replace(job.options, solver=solver))) for solver in ("certain", "textbook")]
+    assert names(solvers) == ["certain", "textbook"]
     assert as_csv(runs).decode() == "run,name,seconds,samples,estimate,rmse\n0,\"160 × 120, view 1\",1,2,0.5,\n"
