@@ -17,7 +17,7 @@ from rtcore.jit import inline, kernel
 from rtcore.lanes import LANES, bits, exceeds, fill, load, load3, narrow, select, store, wide
 from rtcore.neighbours import add_one, add_triples, consecutive, copy, load1, load_flat, store1, store_flat, store_triples, turns
 from rtcore.sampling import REPLICATES
-from rtcore.wave import DEPTH_UNIT, NX, T
+from rtcore.wave import DEPTH_UNIT, T, shading_normal
 
 
 class Film(NamedTuple):
@@ -74,7 +74,7 @@ def note_first_hits(film, wave, n, target):
 @inline
 def _note_eight(film, p, rays, surface, i):
     """What rays i .. i+7, of pixels p .. p+7, hit."""
-    hit, normal = exceeds(rays.prim, i, -1), load3(surface, NX, i)
+    hit, normal = exceeds(rays.prim, i, -1), load3(surface, shading_normal(surface), i)
     copy(film.prim, p, rays.prim, i)
     for k in range(LANES):
         film.doubt[p + k] = 0
@@ -88,7 +88,7 @@ def _note_one(film, p, rays, surface, i):
     film.prim[p], film.doubt[p] = rays.prim[i], 0
     film.distance[p] = rays.ray[T, i]
     for k in range(3):
-        film.normal[p, k] = surface[NX + k, i] if rays.prim[i] >= 0 else 0
+        film.normal[p, k] = surface[shading_normal(surface) + k, i] if rays.prim[i] >= 0 else 0
 
 
 @kernel

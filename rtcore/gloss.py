@@ -11,7 +11,7 @@ import numpy as np
 from rtcore.jit import inline, kernel
 from rtcore.sampling import GLOSS, centered, disk, hash32
 from rtcore.shading import IOR, REFRACTED, ROUGHNESS
-from rtcore.wave import DX, DY, DZ, GX, GY, GZ, NX, NY, NZ
+from rtcore.wave import DX, DY, DZ, GX, GY, GZ, shading_normal
 
 
 @inline
@@ -50,9 +50,10 @@ def place(pixel, sample, dimension, seed):
 @inline
 def _faced(ray, surface, i):
     """Unit geometric and shading normal on the side that ray i comes from, and 1 if that is the front, else -1."""
+    n = shading_normal(surface)
     side = 1.0 if ray[DX, i] * surface[GX, i] + ray[DY, i] * surface[GY, i] + ray[DZ, i] * surface[GZ, i] < 0 else -1.0
     return (side * surface[GX, i], side * surface[GY, i], side * surface[GZ, i],
-            side * surface[NX, i], side * surface[NY, i], side * surface[NZ, i], side)
+            side * surface[n, i], side * surface[n + 1, i], side * surface[n + 2, i], side)
 
 
 @kernel

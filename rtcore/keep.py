@@ -7,7 +7,7 @@ changed, the tile goes through the same stages as ever, and where a ray is known
 leaves valid is said in `rtcore.edits`.
 
 Seventeen bytes a ray (thirteen with float32), four for each light that shone on it, and for hits on formulas and blobs their surface rows,
-84 bytes (44), which take longer to work out.
+60 bytes (32) or, beside smooth meshes, 84 (44), which take longer to work out.
 """
 import threading
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ class Rows(NamedTuple):
     """Surface rows of some columns of a wave."""
 
     at: np.ndarray          # int32 (k): the columns
-    rows: np.ndarray        # P (10, k): as `Wave.surface`
+    rows: np.ndarray        # P (7 or 10, k): as `Wave.surface`
 
 
 class Known(NamedTuple):
@@ -167,7 +167,7 @@ def _note_shadows(beam, first, last, depth):
 
 @kernel
 def _take_rows(surface, at, rows):
-    """rows (10, k) = those of a wave's columns `at`."""
+    """rows (7 or 10, k) = those of a wave's columns `at`."""
     for r in range(rows.shape[0]):
         for j in range(len(at)):
             rows[r, j] = surface[r, at[j]]
@@ -347,6 +347,9 @@ class Recall:
         depth = len(self.levels) - 1
         old = self._kept[depth] if depth < len(self._kept) else None
         if old is None or old.rows is None:
+            return False
+        if len(old.rows.rows) != len(wave.surface):     # a mesh that brings normals has come or gone
+            old.rows = None
             return False
         if self._was is None:
             _put_rows(wave.surface, *old.rows)

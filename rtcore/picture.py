@@ -101,12 +101,13 @@ class Render:
         self.fresh = not goes_on        # the film was empty
         if reused and not goes_on:
             films.clear(self.film)
-        if before is not None and len(before.scratches) == threads and before.tracer.geometry.dtype == geometry.dtype:
-            self.scratches = before.scratches
+        fitting = [s for s in before.scratches if (s.dtype, s.smooth) == (geometry.dtype, self.plan.smooth)] if before is not None else []
+        if len(fitting) == threads:
+            self.scratches = fitting
             for scratch in self.scratches if not goes_on else ():
                 scratch.renew()
         else:
-            self.scratches = [Scratch(geometry.dtype) for _ in range(threads)]
+            self.scratches = [Scratch(geometry.dtype, self.plan.smooth) for _ in range(threads)]
             if goes_on:
                 self.scratches[0].counts += before.counts()
         self.recast = Recast(geometry, view, width, height)

@@ -36,6 +36,7 @@ class Plan(NamedTuple):
     lens: bool
     gloss: bool
     filter: bool            # other than a box
+    smooth: bool            # normals that a mesh brings
     textbook: bool          # formulas where there is a kernel of them
     samples: int                    # per pixel
 
@@ -92,7 +93,7 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
         why = "none shines from a place or direction" if answers or not materials else "no visible material answers light"
         out.append(("lights", why if lit else NO_LIGHT))
     shadows = _keep(stages, out, "shadow rays", [(lit, NO_LIGHT), (settings.shadows, "switched off"), (lights, "no light to cast them")])
-    _keep(stages, out, "smooth normals", [(smooth, "no mesh brings normals")])
+    smooth = _keep(stages, out, "smooth normals", [(smooth, "no mesh brings normals")])
     _keep(stages, out, "patterns", [(any(m.checker for m in materials), "no visible material has one")])
     fog = _keep(stages, out, "fog", [
         (lit, NO_LIGHT), (scene.fog is not None, "the scene has none"),
@@ -118,7 +119,8 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     samples = settings.samples if lit else 1
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, textbook, samples)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, smooth, textbook,
+                samples)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

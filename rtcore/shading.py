@@ -18,7 +18,7 @@ from rtcore.powers import floor
 from rtcore.latest import Latest
 from rtcore.leaves import Leaf
 from rtcore.scene import Background, Material, invertible
-from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, START, T, finish
+from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, OPAQUE, OX, POLISH, PX, START, T, finish, shading_normal
 
 # columns of Look.material
 (COLOR, AMBIENT, DIFFUSE, SPECULAR, SHININESS, REFLECTION, TRANSMISSION, IOR, FRESNEL, TINT, EMISSION, CHECKER, EVEN, ODD,
@@ -106,7 +106,7 @@ def _colors(m, row, surface, i):
 @inline
 def _faced(ray, surface, i):
     """Unit geometric and shading normals on the sides that rays i .. i+7 come from, and 1 where that is the front, else -1."""
-    d, g, n = wide(load3(ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, NX, i))
+    d, g, n = wide(load3(ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, shading_normal(surface), i))
     side = select(d.x * g.x + d.y * g.y + d.z * g.z < 0, 1, zero(d.x) - 1)
     return g * side, n * side, side
 

@@ -78,12 +78,12 @@ class Clock:
 class Scratch:
     """One thread's arrays, reused from tile to tile, its counts and its clock."""
 
-    def __init__(self, dtype):
-        self.dtype = dtype
+    def __init__(self, dtype, smooth: bool):
+        self.dtype, self.smooth = dtype, smooth
         self.counts = np.zeros(len(COUNTS), np.int64)
         self.clock = Clock()
         self.tally = new_tally()                    # of all waves
-        self.waves = [new_wave(0, dtype, self.tally), new_wave(0, dtype, self.tally)]
+        self.waves = [new_wave(0, dtype, self.tally, smooth), new_wave(0, dtype, self.tally, smooth)]
         self.paths: list[np.ndarray] = []           # by level, see `gloss.roughen`
         self.beam = new_beam(0, 0, dtype, self.tally)
         self.target = self.number = self.zeros = np.zeros(0, np.int32)
@@ -99,7 +99,7 @@ class Scratch:
         yet costs 2 us a page, which for a first picture was half its time."""
         which = level % len(self.waves)
         if self.waves[which].owner.shape[0] < n:
-            self.waves[which] = new_wave(n * 5 // 4, self.dtype, self.tally)
+            self.waves[which] = new_wave(n * 5 // 4, self.dtype, self.tally, self.smooth)
         return self.waves[which]
 
     def path(self, level: int, n: int) -> np.ndarray:

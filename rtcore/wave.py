@@ -17,10 +17,11 @@ OX, OY, OZ, DX, DY, DZ, START, T = range(8)
 RAY_ROWS = 8
 DEAD = -np.inf
 
-# rows of Surface: hit point, geometric and shading normal (unit, on the front), bound on the point's error, texture coordinates
-PX, PY, PZ, GX, GY, GZ, NX, NY, NZ, ERR, U, V = range(12)
+# rows of Surface: hit point, geometric normal (unit, on the front), bound on the point's error, shading normal, texture coordinates
+PX, PY, PZ, GX, GY, GZ, ERR, NX, NY, NZ, U, V = range(12)
 SURFACE_ROWS = 12
-SHADING_ROWS = U      # a picture needs no texture coordinates; worked out all the same, they took 6 % of the time of whitted.yaml
+# a picture needs no texture coordinates, which took 6 % of the time of whitted.yaml, and shading normals only where a mesh brings them
+SMOOTH_ROWS, FLAT_ROWS = U, NX
 
 #: Optical depth of an opaque primitive, and what one unit of it is worth: light · exp(-depth·DEPTH_UNIT). Depths are integers, so
 #: that the order in which a shadow ray meets transparent things can't change a bit of the picture.
@@ -77,6 +78,12 @@ def _cleared(ray: np.ndarray, prim: np.ndarray, depth: np.ndarray, doubt: np.nda
 
 
 @inline
+def shading_normal(surface):
+    """The first of the rows that hold it."""
+    return NX if surface.shape[0] > NX else GX
+
+
+@inline
 def alive(ray, i):
     """Lanes i .. i+7 whose interval is not empty: rays that have ended are in the same vector as others."""
     return load(ray, T, i) > load(ray, START, i)
@@ -130,7 +137,7 @@ class Wave(NamedTuple):
     """Rays with what they carry and what is found where they hit. n columns, as many as `rays` has."""
 
     rays: Rays
-    surface: np.ndarray     # P (10 or 12, n), rows as named above; only columns that hit something
+    surface: np.ndarray     # P (7, 10 or 12, n), rows as named above; only columns that hit something
     light: np.ndarray       # float32 (3, n): radiance that comes along the ray
     weight: np.ndarray      # float32 (3, n): how much of it the pixel gets
     fade: np.ndarray        # float32 (n): what fog lets through
@@ -152,12 +159,12 @@ GLOSS, POLISH, ANSWER_ROWS = 3, 4, 5
 NO_ANSWER = np.zeros((ANSWER_ROWS, 0), np.float32)      # where there is no light to answer
 
 
-def new_wave(n: int, dtype, tally: np.ndarray | None = None) -> Wave:
-    """A wave for `n` rays, with nothing set."""
+def new_wave(n: int, dtype, tally: np.ndarray | None = None, smooth: bool = True) -> Wave:
+    """A wave for `n` rays, with nothing set; smooth: with room for shading normals that are not the geometric ones."""
     n = padded(n)
     *rays, surface, light, weight, fade, owner, source = _carved(
-        *_rays(n, dtype), ((SHADING_ROWS, n), dtype), ((3, n), np.float32), ((3, n), np.float32), ((n,), np.float32), ((n,), np.int32),
-        ((n,), np.int32))
+        *_rays(n, dtype), ((SMOOTH_ROWS if smooth else FLAT_ROWS, n), dtype), ((3, n), np.float32), ((3, n), np.float32),
+        ((n,), np.float32), ((n,), np.int32), ((n,), np.int32))
     return Wave(_cleared(*rays, new_tally() if tally is None else tally), surface, light, weight, fade, owner, source)
 
 

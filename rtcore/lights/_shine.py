@@ -12,7 +12,7 @@ from rtcore.lanes import (LANES, any_lane, bits, dot, exceeds, fill, greatest, l
                           wide, zero)
 from rtcore.neighbours import consecutive, load1, store1
 from rtcore.powers import power
-from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, NX, OPAQUE, OX, POLISH, PX, RAY_ROWS, START, T
+from rtcore.wave import DEPTH_UNIT, DX, ERR, GLOSS, GX, OPAQUE, OX, POLISH, PX, RAY_ROWS, START, T, shading_normal
 
 
 class Reach(NamedTuple):
@@ -43,7 +43,7 @@ def shine_on(wave, i, beam, j, color, way, toward, end, strength, reach):
     if known and bits(exceeds(reach.depth, i, OPAQUE - 1)) == 255:
         return 0
     surface, answer, ray, bring = wave.surface, beam.answer, beam.rays.ray, beam.bring
-    d, g, normal = wide(load3(wave.rays.ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, NX, i))
+    d, g, normal = wide(load3(wave.rays.ray, DX, i)), wide(load3(surface, GX, i)), wide(load3(surface, shading_normal(surface), i))
     side = select(dot(d, g) < 0, 1, zero(d.x) - 1)      # the side that the ray comes from
     g, normal = g * side, normal * side
     cosine, gloss = dot(normal, toward), wide(load(answer, GLOSS, i))

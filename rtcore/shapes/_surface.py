@@ -26,13 +26,14 @@ def hits_from(rays, i, p):
 
 @inline
 def put_surfaces(out, i, ok, p, normal, reach):
-    """Columns i .. i+7 where ok: point, unit normal (geometric and shading), and a bound on the point's error, 8 roundings of the largest
-    number it was made from: its own coordinates, or `reach`."""
+    """Columns i .. i+7 where ok: point, unit normal (shading too if there is room), and a bound on the point's error, 8 roundings of the
+    largest number it was made from: its own coordinates, or `reach`."""
     eps = 2.0 ** -20 if out.itemsize == 4 else 2.0 ** -49
     put3(out, PX, i, ok, p)
     put3(out, GX, i, ok, normal)
-    put3(out, NX, i, ok, normal)
     put(out, ERR, i, ok, eps * greatest(reach, extent_of(p)))
+    if out.shape[0] > NX:
+        put3(out, NX, i, ok, normal)
 
 
 @inline

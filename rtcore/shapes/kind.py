@@ -156,13 +156,14 @@ def around(out, y, x):
 
 @inline
 def put_surface(out, i, px, py, pz, nx, ny, nz, u, v, reach):
-    """Fill column i: point, unit normal (geometric and shading), texture coordinates; the point's error is bounded by 8 roundings
+    """Fill column i: point, unit normal (shading too if there is room), texture coordinates; the point's error is bounded by 8 roundings
     of the largest number it was made from: its own coordinates, or `reach`."""
     eps = 2.0 ** -20 if out.itemsize == 4 else 2.0 ** -49
     out[PX, i], out[PY, i], out[PZ, i] = px, py, pz
     out[GX, i], out[GY, i], out[GZ, i] = nx, ny, nz
-    out[NX, i], out[NY, i], out[NZ, i] = nx, ny, nz
     out[ERR, i] = eps * max(reach, max(abs(px), max(abs(py), abs(pz))))
+    if out.shape[0] > NX:
+        out[NX, i], out[NY, i], out[NZ, i] = nx, ny, nz
     if out.shape[0] > U:
         out[U, i], out[V, i] = u, v
 

@@ -277,7 +277,7 @@ def _put_triangles(rays, i, ok, out, data, extra, side, q):
     normal = select(flagged(side, q, MIRRORED), -normal, normal)
     put_surfaces(out, i, ok, a + (e * beta + f * gamma) * power_of_two(scale), normal, extent_of(a) + longest)
     put_coordinates(out, i, ok, beta, gamma)
-    if extra.shape[0] > 0:
+    if extra.shape[0] > 0 and out.shape[0] > NX:
         m = pick3(extra, q, 0)
         m = m + (pick3(extra, q, 3) - m) * beta + (pick3(extra, q, 6) - m) * gamma
         put3(out, NX, i, ok & (m.x * m.x + m.y * m.y + m.z * m.z > 0), normalized(m))
