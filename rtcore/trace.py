@@ -159,7 +159,7 @@ class Tracer:
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
         self.lamps = [self._lamp(light) for light in plan.lights]
         names = [group.kind.name for group in geometry.groups]
-        self.meet = [settings.solver == "textbook" and group.kind.textbook or group.kind.intersect for group in geometry.groups]
+        self.meet = [group.kind.textbook if plan.textbook and group.kind.textbook else group.kind.intersect for group in geometry.groups]
         self.laps = [Laps((f"hits: {name}", name), ("surface at the hits", name), ("shadow rays", name)) for name in names]
         # something asks which sample a ray belongs to
         self.filter = filters.made(settings.filter) if plan.filter else None

@@ -33,9 +33,10 @@ def pytest_configure(config):
 
 
 def pytest_xdist_auto_num_workers(config) -> int:
-    """One process for each processor if it is the whole suite; who names tests sees them run in this process."""
-    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
-    return os.cpu_count() or 1 if whole and fcntl is not None else 0
+    """One process for each processor, eight at most, if it is the whole suite; who names tests sees them run in this process."""
+    if config.args_source is not pytest.Config.ArgsSource.TESTPATHS or fcntl is None:
+        return 0
+    return min(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1, 8)
 
 
 @contextlib.contextmanager
