@@ -17,7 +17,7 @@ from rtcore.indices import among, pick, rows_of
 from rtcore.jit import inline, kernel, out_of_line
 from rtcore.lanes import (LANES, along, any_lane, bits, dot, fma, least, load, load3, root, rounded, select, size, splat3, vec3, wide, zero)
 from rtcore.pairs import add, divide, multiply, two_sum
-from rtcore.scene import Shape, invertible
+from rtcore.scene import UNMOVED, Shape, invertible
 from rtcore.shapes import _second
 from rtcore.shapes._ball import U64, advance, extent, lowest
 from rtcore.shapes._second import FORM, IN_SLAB, LAST, NEXT, SLAB, form_of, heights, line_form, may_meet, noise_along
@@ -77,24 +77,30 @@ class Cone(Shape, frozen=True):
         return frustum(self.base, self.base_radius, self.apex, self.apex_radius, self.capped, matrix)
 
 
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a x b; numpy's takes 30 us, a third of what a cone takes to pack."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
 def frustum(base, base_radius, apex, apex_radius, capped, matrix) -> Packed:
     """The frustum with its greater radius scaled to 1, its axis to z and its height to 1; and its exact form."""
     base, apex = np.array(base), np.array(apex)
     axis = apex - base
     length = np.abs(axis).max()
     z = axis / length / np.linalg.norm(axis / length)
-    x = np.cross(z, np.eye(3)[np.abs(z).argmin()])
+    x = _cross(z, UNMOVED[np.abs(z).argmin(), :3])
     x /= np.linalg.norm(x)
     most = max(base_radius, apex_radius)
     unit = np.eye(4)
-    unit[:3, :3] = np.stack([x * most, np.cross(z, x) * most, axis], axis=1)
+    unit[:3, :3] = np.stack([x * most, _cross(z, x) * most, axis], axis=1)
     unit[:3, 3] = base
     local = matrix @ unit
     back = invertible(local)
     power = float(np.ldexp(1.0, np.frexp(most)[1]))     # the form's unit of length
     exact = np.zeros(LIMIT + 1)
     exact_frustum(base, apex, base_radius, apex_radius, power, exact)
-    if np.array_equal(matrix, np.eye(4)):
+    if np.array_equal(matrix, UNMOVED):
         exact[INTO:INTO + 9] = np.eye(3).ravel() / power
         even = True
     else:
