@@ -23,6 +23,22 @@ class Latest:
         return result
 
 
+class Each:
+    """What a function tells of each leaf, asked again only of leaves that were not among the latest."""
+
+    def __init__(self, function: Callable[[Leaf], object]):
+        self._function = function
+        self._known: dict[int, tuple[Leaf, object]] = {}        # by identity, which the leaf beside it keeps; replaced at once
+
+    def __call__(self, leaves: tuple[Leaf, ...]) -> list:
+        known, now = self._known, {}
+        for leaf in leaves:
+            entry = known.get(id(leaf))
+            now[id(leaf)] = entry if entry is not None else (leaf, self._function(leaf))
+        self._known = now
+        return [now[id(leaf)][1] for leaf in leaves]
+
+
 class _Leaves:
     """The leaves of the latest scene, which the next one's share as far as they are the same."""
 

@@ -15,6 +15,8 @@ from rtcore import adaptive, film as films, filters
 from rtcore.camera import Camera
 from rtcore.flatten import Geometry, nbytes
 from rtcore.keep import Memory
+from rtcore.latest import Latest
+from rtcore.leaves import Leaf
 from rtcore.pace import Pace
 from rtcore.plan import VIEW, Plan
 from rtcore.recast import Recast
@@ -28,6 +30,13 @@ from rtcore.wave import UNWANTED
 PARTIAL = 0.25      # seconds after which a long pass shows what it has
 LOOK = 0.005        # seconds between two looks whether a pass is still wanted
 SHOWN = 2.0         # how much longer it takes until a frame is on the screen than until it is made
+
+
+@Latest
+def _materials(leaves: tuple[Leaf, ...]) -> np.ndarray:
+    """A number for each leaf, the same for those of one material."""
+    numbers: dict[int, int] = {}
+    return np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in leaves], np.int32)
 
 
 class RenderRequest(NamedTuple):
@@ -114,8 +123,7 @@ class Render:
         self.adaptive = self.settings.adaptive and self.plan.samples > adaptive.FIRST
         self.regions = [self.settings.region, None] if self.settings.region else [None]     # to be refined, one after the other
         self.schedule = [*passes(self.coarse, first), *self._further()]
-        numbers: dict[int, int] = {}
-        self.materials = np.array([numbers.setdefault(id(leaf.material), len(numbers)) for leaf in geometry.leaves], np.int32)
+        self.materials = _materials(geometry.leaves)
         self.order: np.ndarray | None = None
         self.spent = float(self.film.count.mean()) if goes_on else 0.0     # samples per pixel, before the pass under way
         self.converged = False  # nothing is left that could be seen

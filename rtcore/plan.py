@@ -1,11 +1,12 @@
 """Which stages a scene under its settings needs, which are left out, and why. The tracer runs exactly what the plan says."""
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
 
 from rtcore.camera import Camera
 from rtcore.lights import SHINE, STUDIO, Ambient
-from rtcore.latest import Latest, leaves_of
+from rtcore.latest import Each, Latest, leaves_of
 from rtcore.leaves import Leaf
 from rtcore.scene import Light, Material, Scene
 from rtcore.settings import Settings
@@ -44,13 +45,21 @@ class Plan(NamedTuple):
 @Latest
 def _contents(leaves: tuple[Leaf, ...]) -> tuple[dict[Kind, int], tuple[Material, ...], bool]:
     """Of what is visible: the number of primitives of each kind, the materials, whether there are smooth normals."""
-    visible = [leaf for leaf in leaves if leaf.visible]
     counts: dict[Kind, int] = {}
-    for leaf in visible:
-        kind = leaf.shape.kind(leaf.matrix)
-        counts[kind] = counts.get(kind, 0) + leaf.shape.count()
-    return (counts, tuple({id(leaf.material): leaf.material for leaf in visible}.values()),
-            any(getattr(leaf.shape, "normals", None) is not None for leaf in visible))
+    told = Counter(_told(leaves))
+    for (kind, count, _), times in told.items():
+        if count:
+            counts[kind] = counts.get(kind, 0) + count * times
+    return (counts, tuple({id(leaf.material): leaf.material for leaf in leaves if leaf.visible}.values()),
+            any(smooth for _, _, smooth in told))
+
+
+@Each
+def _told(leaf: Leaf) -> tuple[Kind | None, int, bool]:
+    """Of what sort a leaf's primitives are, how many that is, and whether they bring normals; none of a hidden one."""
+    if not leaf.visible:
+        return None, 0, False
+    return leaf.shape.kind(leaf.matrix), leaf.shape.count(), getattr(leaf.shape, "normals", None) is not None
 
 
 def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan:

@@ -53,17 +53,18 @@ def make_look(leaves: tuple[Leaf, ...], leaf: np.ndarray, ambient: np.ndarray, b
 @Latest
 def _tables(leaves: tuple[Leaf, ...], leaf: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The first three fields of `Look`."""
-    rows, depths, index, used = [], [], {}, np.unique(leaf)
-    row_of = np.zeros(len(leaves), np.int32)
+    rows, depths, index, row_of = [], [], {}, np.zeros(len(leaves), np.int32)
+    used, which = np.unique(leaf).tolist(), []
     for i in used:
         material, matrix = leaves[i].material, leaves[i].matrix
         # a pattern sits in the object's space, so its leaves need rows of their own
-        key = (id(material), matrix.tobytes() if material.checker else b"")
-        if key not in index:
-            index[key] = len(rows)
+        key = (id(material), matrix.tobytes()) if material.checker else id(material)
+        row = index.setdefault(key, len(rows))
+        if row == len(rows):
             rows.append(_row(material, matrix))
             depths.append(optical_depth(material))
-        row_of[i] = index[key]
+        which.append(row)
+    row_of[used] = which
     of = row_of[leaf]
     return np.array(rows).reshape(-1, MATERIAL_COLUMNS), of, np.array(depths, np.int32)[of]
 
