@@ -48,7 +48,7 @@ def _contents(leaves: tuple[Leaf, ...]) -> tuple[dict[Kind, int], tuple[Material
     counts: dict[Kind, int] = {}
     told = Counter(_told(leaves))
     for (kind, count, _), times in told.items():
-        if count:
+        if kind is not None:
             counts[kind] = counts.get(kind, 0) + count * times
     return (counts, tuple({id(leaf.material): leaf.material for leaf in leaves if leaf.visible}.values()),
             any(smooth for _, _, smooth in told))
