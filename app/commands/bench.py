@@ -6,9 +6,6 @@ from app.commands._progress import Progress
 from app.commands._shared import Parser, Refused, same_file, say, writable_or_refused, write_json
 from app.commands.render import interruptible
 
-NAME = "bench"
-HELP = "measure how fast pictures and rays are, beside other ray tracers"
-
 WIDTH = 150     # of the table where it goes to no terminal
 
 

@@ -1,9 +1,6 @@
 """`rayscope check`: whether a scene file is sound."""
 from app.commands._shared import Parser, loaded, refusing
 
-NAME = "check"
-HELP = "say whether a scene file is sound, or where it is not"
-
 
 def arguments(parser: Parser) -> None:
     """The options of the command."""

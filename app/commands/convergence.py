@@ -8,9 +8,6 @@ from app.commands._shared import (Parser, Refused, compile_missing, enough_memor
                                   whole)
 from app.commands.render import interruptible
 
-NAME = "convergence"
-HELP = "measure the error of a scene's picture against run time, by several methods"
-
 SIZE, REFERENCE, BUDGET, DEFAULT = (256, 192), 1024, 10.0, "uniform,adaptive,f32"
 
 

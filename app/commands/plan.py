@@ -2,9 +2,6 @@
 from app.commands._shared import (Parser, Refused, compile_missing, loaded, refusing, same_file, settings_from, writable_or_refused,
                                   write_json)
 
-NAME = "plan"
-HELP = "say which stages a scene needs, which are left out, and why"
-
 SIZE = (160, 120)       # of the picture on which the shares are measured
 
 

@@ -26,9 +26,6 @@ from app.commands._shared import (
 )
 from app.forecast import Forecast
 
-NAME = "render"
-HELP = "render a scene to a picture"
-
 SAMPLES = 16            # unless something else is asked for
 NO_END = 1 << 16        # samples that a limit of time or error cuts short
 SECONDS = ("load", "prepare", "compile", "trace", "total")

@@ -7,9 +7,6 @@ from app.commands._progress import Progress
 from app.commands._shared import Parser, Refused, compile_missing, say
 from app.commands.render import interruptible
 
-NAME = "stability"
-HELP = "measure numerical stability on extreme cases, every shape and solver against a 50-digit oracle"
-
 
 def arguments(parser: Parser) -> None:
     """The options of the command."""

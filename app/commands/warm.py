@@ -4,9 +4,6 @@ import time
 from app.commands._progress import time_in_words
 from app.commands._shared import Parser, compile_missing, loaded, refusing
 
-NAME = "warm"
-HELP = "compile every kernel into the cache, or only what some scenes need"
-
 
 def arguments(parser: Parser) -> None:
     """The options of the command."""
