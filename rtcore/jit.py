@@ -18,7 +18,9 @@ import shutil
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
+from typing import NamedTuple
 
 import llvmlite
 import llvmlite.binding
@@ -26,8 +28,9 @@ import numba
 import numpy
 import platformdirs
 from numba import njit, types
-from numba.core.compiler import CompileResult
-from numba.core.runtime import rtsys
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult, compile_result
+from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 from numba.extending import intrinsic
 
@@ -51,11 +54,15 @@ def cache_root() -> Path:
 
 
 @functools.cache
-def _source(module: str) -> Path | None:
-    if module.split(".")[0] != PACKAGE.name:
-        return Path(sys.modules[module].__file__)      # a kernel of a test or of a user's script
-    path = PACKAGE.parent.joinpath(*module.split("."))
-    return next((p for p in (path.with_suffix(".py"), path / "__init__.py") if p.is_file()), None)
+def _files() -> dict[str, str]:
+    """The file of every module of rtcore."""
+    found = {}
+    for folder, _, names in os.walk(PACKAGE):
+        package = ".".join((PACKAGE.name, *Path(folder).relative_to(PACKAGE).parts))
+        for name in names:
+            if name.endswith(".py"):
+                found[package if name == "__init__.py" else f"{package}.{name[:-3]}"] = os.path.join(folder, name)
+    return found
 
 
 _TYPES: dict = {}       # numba's types of arguments, by `_kind_of`
@@ -76,14 +83,27 @@ def typed(value) -> types.Type:
     return _TYPES[kind]
 
 
+_IMPORT = re.compile(r"^[ \t]*from (rtcore[\w.]*) import ([^\n]+)", re.M)
+
+
 @functools.cache
-def _imports(module: str) -> frozenset[str]:
-    """The rtcore modules that a module's source imports, itself included."""
-    found = {module}
-    for package, names in re.findall(r"^\s*from (rtcore[\w.]*) import ([^\n]+)", _source(module).read_text("utf-8"), re.M):
+def _source(module: str) -> tuple[bytes, frozenset[str]]:
+    """A hash of a module's source, and the modules of rtcore that it imports."""
+    # a module of another package has kernels of a test or of a user's script
+    with open(_files().get(module) or sys.modules[module].__file__, "rb") as file:
+        source = file.read()
+    found = set()
+    for package, names in _IMPORT.findall(source.decode()):
         found.add(package)
         found.update(f"{package}.{name}" for name in re.findall(r"\w+", names))
-    return frozenset(name for name in found if _source(name))
+    return hashlib.sha256(source).digest(), frozenset(found & _files().keys())
+
+
+@functools.cache
+def _compiler() -> bytes:
+    """What makes kernels of sources: versions, and the processor."""
+    return repr((numba.__version__, llvmlite.__version__, numpy.__version__, sys.version_info[:2],
+                 llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten())).encode()
 
 
 @functools.cache
@@ -92,11 +112,10 @@ def fingerprint(module: str) -> str:
     closure, todo = set(), {module}
     while todo:
         closure |= todo
-        todo = {name for m in todo for name in _imports(m)} - closure
-    digest = hashlib.sha256(repr((numba.__version__, llvmlite.__version__, numpy.__version__, sys.version_info[:2],
-                                  llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten())).encode())
+        todo = {name for m in todo for name in _source(m)[1]} - closure
+    digest = hashlib.sha256(_compiler())
     for name in sorted(closure):
-        digest.update(name.encode() + _source(name).read_bytes())
+        digest.update(name.encode() + _source(name)[0])
     return digest.hexdigest()[:16]
 
 
@@ -111,6 +130,70 @@ def prune() -> None:
         with contextlib.suppress(OSError):      # another process was quicker
             if time.time() - folder.stat().st_mtime > KEEP_DAYS * 86400:
                 shutil.rmtree(folder, ignore_errors=True)
+
+
+@functools.cache
+def _name_runtime() -> None:
+    """Tell LLVM where the functions of numba's runtime are that kernels call. `rtsys.initialize` does that too, but takes 25 ms to compile
+    what only kernels that are being compiled need; then numba calls it."""
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
+class Library(JITCodeLibrary):
+    """A kernel's machine code, from the cache. Its bitcode is parsed only when a kernel that is being compiled calls it: that takes longer
+    than all the rest, 3 ms of a kernel's 5."""
+
+    def __init__(self, codegen, name: str, code: bytes, bitcode: bytes):
+        super().__init__(codegen, name)
+        self._bitcode = bitcode
+        self.enable_object_caching()
+        self._set_compiled_object(code)
+        self._finalize_final_module()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """The address of one of its functions. Numba would look it up among those in the bitcode first."""
+        return self.codegen._engine.get_function_address(name)
+
+    def _get_module_for_linking(self):
+        if self._shared_module is None:
+            self._shared_module = llvmlite.binding.parse_bitcode(self._bitcode)
+        return self._shared_module
+
+
+class Stored(NamedTuple):
+    """What the file of a kernel and signature holds."""
+
+    name: str
+    code: bytes
+    bitcode: bytes              # for kernels that call it
+    descriptor: object
+    signature: object
+    environment: object
+    environments: tuple         # of functions inlined into it, as far as its code asks for them
+    initial: tuple              # functions to be called before it is
+
+    @classmethod
+    def of(cls, compiled: CompileResult) -> "Stored":
+        """From what numba has compiled. It would keep the environments of all functions that were inlined, up to a hundred, for which it
+        takes as long as for all the rest; but code asks for them only to make Python's objects."""
+        (name, _, (code, bitcode)), descriptor, environment, signature, _, _, _, initial, environments = compiled._reduce()
+        named = Counter(re.findall(r'@"?(_ZN08NumbaEnv[\w.$]+)', compiled.library.get_llvm_str()))
+        used = tuple(other for other in environments if named[other.env_name] > 1)      # where it is defined, and elsewhere
+        return cls(name, code, bitcode, descriptor, signature, environment, used, initial)
+
+    def loaded(self, target) -> CompileResult:
+        """Ready to be called."""
+        _name_runtime()
+        for function in self.initial:
+            function()
+        library = Library(target.codegen(), self.name, self.code, self.bitcode)
+        entry_point = target.get_executable(library, self.descriptor, self.environment)
+        for other in self.environments:
+            target.codegen().set_env(other.env_name, other)
+        return compile_result(target_context=target, typing_context=target.typing_context, library=library, fndesc=self.descriptor,
+                              signature=self.signature, entry_point=entry_point, environment=self.environment,
+                              referenced_envs=self.environments, reload_init=self.initial, objectmode=False, lifted=(), type_annotation="")
 
 
 class Cache:
@@ -144,14 +227,13 @@ class Cache:
             data = self._file(signature).read_bytes()
         except OSError:
             return None
-        rtsys.initialize(target)        # what code calls that counts references
-        return CompileResult._rebuild(target, *pickle.loads(data))
+        return Stored(*pickle.loads(data)).loaded(target)
 
     def save_overload(self, signature, compiled) -> None:
         """Keep it, written beside and renamed; a folder that can't be written is no reason not to go on."""
         if compiled.library.has_dynamic_globals:
             raise ValueError(f"{self._function.__qualname__} refers to addresses of this process, so it can't be kept")
-        path, data = self._file(signature), dumps(compiled._reduce())
+        path, data = self._file(signature), dumps(tuple(Stored.of(compiled)))
         beside = path.with_suffix(f".{os.getpid()}")
         with contextlib.suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)

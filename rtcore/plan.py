@@ -10,7 +10,7 @@ from rtcore.latest import Each, Latest, leaves_of
 from rtcore.leaves import Leaf
 from rtcore.scene import Light, Material, Scene
 from rtcore.settings import Settings
-from rtcore.shapes import DOUBTFUL, KINDS
+from rtcore.shapes import KINDS
 from rtcore.shapes.kind import Kind
 from rtcore.views import VIEWS
 
@@ -118,7 +118,7 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
     kinds = tuple(sorted(counts, key=lambda k: k.name))
     casting = sorted({type(light).__name__.lower() for light in lights})
     wanted = {"core": True, "glow": lit, "lens": lens, "samples": "further samples" in stages,
-              "doubt": any(kind in DOUBTFUL for kind in kinds),
+              "doubt": any(kind.doubtful for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds}, **{f"textbook-{name}": textbook for name in plain},
               **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss, "filter": shaped,

@@ -19,7 +19,6 @@ from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog, Light
 from rtcore.sampling import LIGHTS
 from rtcore.settings import Settings
-from rtcore.shapes import DOUBTFUL
 from rtcore.wave import COUNTED, NO_ANSWER, Beam, Wave, find_kinds, new_beam, new_tally, new_wave, padded
 
 CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
@@ -255,7 +254,7 @@ class Tracer:
         if recall is None or not recall.noted:
             self.run(films.note_first_hits, film, wave, n, scratch.target)
             for group in self.geometry.groups:
-                if group.kind in DOUBTFUL:
+                if group.kind.doubtful:
                     films.note_doubt(film, wave, n, scratch.target, group.first, group.first + len(group.owner))
                 if group.kind.textbook is not None and self.plan.textbook:
                     prim, last = wave.rays.prim[:n], group.first + len(group.owner)

@@ -65,6 +65,41 @@ def test_an_edit_compiles_anew(start, tmp_path):
     assert "AssertionError" in again.communicate(timeout=120)[1]
 
 
+#: A kernel and one that calls it, which makes arrays and can raise.
+CALLER = """
+from numbers_of_mine import add
+
+@kernel
+def twice(a, b):
+    if len(a) != len(b):
+        raise ValueError(("of", len(a), "and", len(b)))
+    return 2 * add(a, b.copy())
+"""
+
+
+def test_a_kernel_from_the_cache_is_linked_into_one_that_is_compiled(start, tmp_path):
+    result(start(CALL.format(dtype="np.float64")))      # the cache has `add` alone
+    (tmp_path / "callers.py").write_text("from rtcore.jit import kernel\n" + CALLER)
+    code = """import callers, numbers_of_mine as m, numpy as np
+assert callers.twice(np.arange(4.0), np.ones(4)) == 12
+try:
+    callers.twice(np.ones(3), np.ones(4))
+except ValueError as error:
+    print(*error.args[0])
+print([(sum(k.stats.cache_hits.values()), sum(k.stats.cache_misses.values())) for k in (m.add, callers.twice)])
+assert m.add(np.arange(4.0), np.ones(4)) == 6
+"""
+    assert result(start(code)).splitlines() == ["of 3 and 4", "[(1, 0), (0, 1)]"]
+    assert result(start(code)).splitlines() == ["of 3 and 4", "[(0, 0), (1, 0)]"]       # all that it calls is in it
+
+
+def test_bitcode_is_parsed_only_where_a_kernel_is_compiled(start):
+    code = ("import llvmlite.binding\nllvmlite.binding.parse_bitcode = None\n" + CALL.format(dtype="np.float64")
+            + "from numba.core.runtime import rtsys\nprint(rtsys._init)")
+    result(start(CALL.format(dtype="np.float64")))
+    assert result(start(code)) == "False"
+
+
 def test_a_folder_that_cannot_be_written_only_costs_time(start, tmp_path):
     (tmp_path / "cache" / "kernels").mkdir(parents=True)
     code = ("import numbers_of_mine as m\nm.add._cache.folder.write_text('in the way')\n"

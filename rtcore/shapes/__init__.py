@@ -16,6 +16,3 @@ SHAPES = (Sphere, Plane, Triangle, Mesh, Polygon, Box, Cylinder, Cone, Quadric, 
 #: Every kind of primitive that a shape can become.
 KINDS = (SPHERE, ELLIPSOID, PLANE, TRIANGLE, POLYGON, BOX, CONE, QUADRIC, OPEN_QUADRIC, TORUS, POLYHEDRON, OPEN_POLYHEDRON, BLOB,
          IMPLICIT)
-
-#: Those whose hits may lack a proof; they write Rays.doubt.
-DOUBTFUL = (IMPLICIT,)

@@ -265,4 +265,4 @@ def line_roots(shape: Implicit, matrix: np.ndarray, origin, direction, side: int
 
 
 IMPLICIT = Kind("implicit", intersect, surface, _bounds, (Implicit("x^2 + y^2 + z^2 - 1", (-1, -1, -1), (1, 1, 1)), ()), leaf_most=1,
-                lasting=True)
+                doubtful=True, lasting=True)
