@@ -7,25 +7,32 @@
 
 Shapes, lights and the parts of a scene are records to be made directly: `rtcore.Sphere((0, 0, 0), 1)`.
 """
-from rtcore.api import Hits, Image, intersect, occluded, render
-from rtcore.camera import Camera
-from rtcore.fields import FieldError
-from rtcore.files import FileError, load, save
-from rtcore.lights import Ambient, Directional, Point, RectangleLight, SphereLight
-from rtcore.scene import (Background, Checker, Fog, Material, Matrix, Node, Rotate, Scale, Scene, Shear, Translate)
-from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Polyhedron, Quadric, Sphere, Torus, Triangle
+from importlib import import_module
+from typing import Any
 
-__all__ = ["Ambient", "Background", "Blob", "Box", "Camera", "Checker", "Cone", "Cylinder", "Directional", "FieldError", "FileError",
-           "Fog", "Hits", "Image", "Implicit", "Material", "Matrix", "Mesh", "Node", "Plane", "Point", "Polygon", "Polyhedron", "Quadric",
-           "RectangleLight", "Rotate", "Scale", "Scene", "Shear", "Sphere", "SphereLight", "Torus", "Translate", "Triangle", "crossings",
-           "intersect", "load", "occluded", "render", "save"]
+#: The module of each name, imported when that is first asked for: exact crossings bring the algebra, a picture numba.
+_MODULES = {name: f"rtcore.{module}" for module, names in {
+    "algebra.crossings": ("crossings",),
+    "api": ("Hits", "Image", "intersect", "occluded", "render"),
+    "camera": ("Camera",),
+    "fields": ("FieldError",),
+    "files": ("FileError", "load", "save"),
+    "lights": ("Ambient", "Directional", "Point", "RectangleLight", "SphereLight"),
+    "scene": ("Background", "Checker", "Fog", "Material", "Matrix", "Node", "Rotate", "Scale", "Scene", "Shear", "Translate"),
+    "shapes": ("Blob", "Box", "Cone", "Cylinder", "Implicit", "Mesh", "Plane", "Polygon", "Polyhedron", "Quadric", "Sphere", "Torus",
+               "Triangle"),
+}.items() for name in names}
+
+__all__ = sorted(_MODULES)
 __version__ = "0.1.0"
 
 
-def __getattr__(name: str):
-    """What most programs never call is imported when it is first asked for: exact crossings bring the algebra with them."""
-    if name == "crossings":
-        from rtcore.algebra.crossings import crossings
-        globals()[name] = crossings
-        return crossings
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value = getattr(import_module(_MODULES[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -10,7 +10,7 @@ from numba.core.dispatcher import Dispatcher
 
 from rtcore.jit import Cache
 from rtcore.plan import Plan
-from rtcore.shapes import KINDS
+from rtcore.shapes import KIND_MODULES
 
 #: Kinds as one speaks of several of them.
 PLURALS = {"box": "boxes", "cone": "cones and cylinders", "torus": "tori", "polyhedron": "polyhedra", "open-polyhedron": "open polyhedra",
@@ -79,7 +79,7 @@ def sentences(account: Account) -> list[str]:
         shares = _series([f"{first[0]} of its time on {first[1]}", *(f"{share} on {words}" for share, words in more)])
         result.append(f"This picture spends {shares}.")
     present = [kept.stage.removeprefix("hits: ") for kept in account.kept if kept.stage.startswith("hits: ")]
-    absent = len(KINDS) - len(present)
+    absent = len(KIND_MODULES) - len(present)
     shapes = _series([plural(kind) for kind in present]) if present else "no shapes"
     result.append(f"It shows {shapes} and needs no kernel of the {absent} {'other ' if present else ''}kinds of shapes.")
     reasons = dict(account.left_out)

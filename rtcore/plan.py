@@ -10,7 +10,7 @@ from rtcore.latest import Each, Latest, leaves_of
 from rtcore.leaves import Leaf
 from rtcore.scene import Light, Material, Scene
 from rtcore.settings import Settings
-from rtcore.shapes import KINDS
+from rtcore.shapes import KIND_MODULES
 from rtcore.shapes.kind import Kind
 from rtcore.views import VIEWS
 
@@ -71,17 +71,19 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
         (lit, NO_LIGHT), (camera.aperture > 0, "the camera is a pinhole"), (settings.samples > 1, FIRST_SAMPLE)])
     shaped = _keep(stages, out, "pixel filter", [
         (lit, NO_LIGHT), (settings.filter != "box", "with a box, samples lie evenly in their pixel"), (settings.samples > 1, CENTRE)])
-    for kind in sorted(KINDS, key=lambda k: k.name):
-        if kind not in counts:
-            out.append((f"hits: {kind.name}", f"no visible {kind.name} in the scene"))
+    present = {kind.name: kind for kind in counts}
+    for name in sorted(KIND_MODULES):
+        if name not in present:
+            out.append((f"hits: {name}", f"no visible {name} in the scene"))
             continue
-        stages.append(f"hits: {kind.name}")
+        stages.append(f"hits: {name}")
+        kind, count = present[name], counts[present[name]]
         if kind.bounds is None:
-            out.append((f"tree: {kind.name}", "they are unbounded"))
-        elif counts[kind] <= kind.leaf_most:
-            out.append((f"tree: {kind.name}", f"only {counts[kind]}: each is tested"))
+            out.append((f"tree: {name}", "they are unbounded"))
+        elif count <= kind.leaf_most:
+            out.append((f"tree: {name}", f"only {count}: each is tested"))
         else:
-            stages.append(f"tree: {kind.name}")
+            stages.append(f"tree: {name}")
     if counts:
         stages.append("surface at the hits")
     plain = [kind.name for kind in counts if kind.textbook is not None]

@@ -13,7 +13,6 @@ from rtcore.flatten import Geometry
 from rtcore.jit import inline, kernel
 from rtcore.lanes import bits, greatest, least, load, wide
 from rtcore.shapes.kind import normalized
-from rtcore.shapes.triangle import TRIANGLE
 from rtcore.wave import SURFACE_ROWS, U, V, finish, new_rays, put_ray
 
 CHUNK = 1 << 13     # rays whose surface is worked out in one go: their arrays stay in the second-level cache
@@ -139,7 +138,7 @@ class Recast:
             for group in self._geometry.groups:
                 group.kind.surface(rays, n, surface, group.table, group.first)
                 last = group.first + len(group.owner)
-                note_places(rays, surface, n, pixels, group.first, last, group.kind is TRIANGLE, self._coordinates)
+                note_places(rays, surface, n, pixels, group.first, last, group.kind.name == "triangle", self._coordinates)
 
         for _ in share(work, self._fresh(film, self._placed)):
             pass

@@ -6,6 +6,7 @@ a line each, and answers each with the same line: several such helpers share a l
 """
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from rtcore.lights import SAMPLED, SHINE, UNNOTED, UNTOLD, Draw, Reach
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.settings import Settings
-from rtcore.shapes import KINDS
+from rtcore.shapes import KIND_MODULES, TEXTBOOK, kind_named
 from rtcore.trace import CLOSEST, COUNTS
 from rtcore.wave import NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
 
@@ -161,39 +162,42 @@ def _example(kind, dtype):
     return flatten(Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())]), precision)
 
 
-def _kind(kind):
+def _kind(name):
     def compile_kind(dtype):
-        wave, _, n = _wave(dtype)
+        kind, (wave, _, n) = kind_named(name), _wave(dtype)
         (group,) = _example(kind, dtype).groups
         kind.intersect(wave.rays, n, group.tree, group.table, 0, CLOSEST)
         kind.surface(wave.rays, n, wave.surface, group.table, 0)
     return compile_kind
 
 
-def _textbook(kind):
+def _textbook(name):
     def compile_textbook(dtype):
-        wave, _, n = _wave(dtype)
+        kind, (wave, _, n) = kind_named(name), _wave(dtype)
         (group,) = _example(kind, dtype).groups
         kind.textbook(wave.rays, n, group.tree, group.table, 0, CLOSEST)
     return compile_textbook
 
 
-#: Each group: the module whose source it hangs on, and how to compile it for a precision.
-GROUPS: dict[str, tuple[str, Callable]] = {
-    "core": ("rtcore.warm", _core), "glow": ("rtcore.warm", _glow), "doubt": ("rtcore.film", _doubt), "samples": ("rtcore.warm", _samples),
-    "screen": ("rtcore.film", _screen), "leaf": ("rtcore.bvh", _leaf), "tree": ("rtcore.bvh", _tree), "lit": ("rtcore.shading", _lit),
-    "lens": ("rtcore.lens", _lens), "bounce": ("rtcore.shading", _bounce), "fog": ("rtcore.fog", _fog), "rows": ("rtcore.rows", _rows),
-    "keep": ("rtcore.keep", _keep), "gloss": ("rtcore.gloss", _gloss), "filter": ("rtcore.filters", _filter),
-    "adaptive": ("rtcore.adaptive", _adaptive), "recast": ("rtcore.recast", _recast),
-    **{f"light-{light.__name__.lower()}": (light.__module__, _light(light)) for light in SHINE},
-    **{kind.name: (kind.intersect.py_func.__module__, _kind(kind)) for kind in KINDS},
-    **{f"textbook-{kind.name}": (kind.textbook.py_func.__module__, _textbook(kind)) for kind in KINDS if kind.textbook is not None},
+#: Each group: the modules that its kernels are in, and how to compile it for a precision.
+GROUPS: dict[str, tuple[tuple[str, ...], Callable]] = {
+    "core": (("rtcore.eye", "rtcore.film", "rtcore.wave"), _core), "glow": (("rtcore.film", "rtcore.shading"), _glow),
+    "doubt": (("rtcore.film",), _doubt), "samples": (("rtcore.eye", "rtcore.film"), _samples), "screen": (("rtcore.film",), _screen),
+    "leaf": (("rtcore.bvh",), _leaf), "tree": (("rtcore.bvh",), _tree), "lit": (("rtcore.shading",), _lit),
+    "bounce": (("rtcore.shading",), _bounce), "lens": (("rtcore.lens",), _lens), "fog": (("rtcore.fog",), _fog),
+    "rows": (("rtcore.rows",), _rows), "keep": (("rtcore.film", "rtcore.keep"), _keep), "gloss": (("rtcore.gloss",), _gloss),
+    "filter": (("rtcore.filters",), _filter), "adaptive": (("rtcore.adaptive",), _adaptive),
+    "recast": (("rtcore.film", "rtcore.recast"), _recast),
+    **{f"light-{light.__name__.lower()}": ((light.__module__,), _light(light)) for light in SHINE},
+    **{name: ((module,), _kind(name)) for name, module in KIND_MODULES.items()},
+    **{f"textbook-{name}": (("rtcore.shapes._textbook",), _textbook(name)) for name in TEXTBOOK},
 }
 ALL = tuple(f"{name}.{precision}" for precision in DTYPES for name in GROUPS)
 
 
-def _marker(name: str):
-    return jit.cache_folder(GROUPS[name.split(".")[0]][0]) / f"{name}.warm"
+def _markers(name: str) -> list[Path]:
+    """Files that say that a group is in the cache, one beside the kernels of each of its modules."""
+    return [jit.cache_folder(module) / f"{name}.warm" for module in GROUPS[name.split(".")[0]][0]]
 
 
 def missing(scene: Scene, settings: Settings, screen: bool = False, camera: Camera | None = None) -> list[str]:
@@ -201,7 +205,7 @@ def missing(scene: Scene, settings: Settings, screen: bool = False, camera: Came
     if none is given. Compiles nothing."""
     groups = ("screen", "keep") if screen else ()
     names = (*plan(scene, settings, camera=camera).kernels, *(f"{group}.{settings.precision}" for group in groups))
-    return [name for name in names if not _marker(name).exists()]
+    return [name for name in names if not all(marker.exists() for marker in _markers(name))]
 
 
 #: Seconds that compiling takes, by group, where it is long.
@@ -211,7 +215,6 @@ SLOW = {"implicit": 33, "blob": 30, "cone": 20, "torus": 17, "quadric": 10, "sph
 
 #: Seconds for the code that kinds of shapes share, which every helper that compiles one has to compile first.
 SHARED = 8
-SHAPES = {kind.name for kind in KINDS}
 
 
 def queue(names: Iterable[str]) -> list[str]:
@@ -220,14 +223,14 @@ def queue(names: Iterable[str]) -> list[str]:
     def place(name: str) -> tuple:
         group, precision = name.split(".")
         seconds = SLOW.get(group, 0)
-        return (0, precision == "f32", -seconds) if group in SHAPES else (1, precision != "f32", seconds)
+        return (0, precision == "f32", -seconds) if group in KIND_MODULES else (1, precision != "f32", seconds)
     return sorted(names, key=place)
 
 
 def worth_sharing(names: Iterable[str]) -> bool:
     """Whether a helper that takes from the end should go on with what is left, or leave a few kinds of shapes to the others."""
     groups = [name.partition(".")[0] for name in names]
-    return not SHAPES.issuperset(groups) or sum(SLOW.get(group, 1) for group in groups) > SHARED
+    return not KIND_MODULES.keys() >= set(groups) or sum(SLOW.get(group, 1) for group in groups) > SHARED
 
 
 def compile_kernels(names: Iterable[str], progress: Callable[[int, int, str], None] = lambda done, total, name: None) -> None:
@@ -240,11 +243,11 @@ def compile_kernels(names: Iterable[str], progress: Callable[[int, int, str], No
         group, precision = name.split(".")
         progress(done, len(names), name)
         GROUPS[group][1](DTYPES[precision])
-        marker = _marker(name)
-        if not marker.exists():
-            compiled = True
-            marker.parent.mkdir(parents=True, exist_ok=True)
-            marker.touch()
+        for marker in _markers(name):
+            if not marker.exists():
+                compiled = True
+                marker.parent.mkdir(parents=True, exist_ok=True)
+                marker.touch()
     progress(len(names), len(names), "")
     if compiled:
         jit.prune()

@@ -6,6 +6,7 @@ import pytest
 
 from rtcore import files
 from rtcore.files import WriteError
+from rtcore.files import scene as scene_files
 from rtcore.lights import Ambient, Point
 from rtcore.scene import Material, Node, Scene, Translate
 from rtcore.shapes import Sphere
@@ -66,7 +67,7 @@ def test_a_link_is_followed_and_permissions_are_kept(tmp_path):
 
 
 def test_a_scene_too_long_to_be_read_back_is_not_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(files.scene, "MOST_BYTES", 100)
+    monkeypatch.setattr(scene_files, "MOST_BYTES", 100)
     with pytest.raises(WriteError, match="which is all that is read back"):
         files.save(Scene(note="x" * 100), tmp_path / "s.yaml")
     assert os.listdir(tmp_path) == []

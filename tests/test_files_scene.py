@@ -119,7 +119,7 @@ def scenes_of_any_kind(draw):
 
 
 @settings(max_examples=50, suppress_health_check=list(HealthCheck))
-@given(scene=scenes_of_any_kind(), suffix=st.sampled_from(files.scene.SUFFIXES))
+@given(scene=scenes_of_any_kind(), suffix=st.sampled_from(files.FORMATS["scene"]))
 def test_a_saved_scene_comes_back_equal(tmp_path_factory, scene, suffix):
     path = tmp_path_factory.mktemp("saved") / f"s{suffix}"
     files.save(scene, path)

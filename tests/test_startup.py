@@ -1,4 +1,5 @@
 """Starting: importing compiles nothing and takes little more than numba does, and a render imports and loads only what it needs."""
+import importlib
 import os
 import subprocess
 import sys
@@ -7,6 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.gallery import FIRST_SCENE
+from rtcore.scene import Shape
+from rtcore.shapes import MODULES, TEXTBOOK, kind_named
+from rtcore.shapes.kind import Kind
 
 ROOT = Path(__file__).parent.parent
 
@@ -69,6 +73,28 @@ def test_a_render_imports_and_loads_only_what_it_needs(tmp_path):
     assert exit_code == "0" and imported == []
     # 4 for any picture, 2 for its light, 2 for lights, 1 for bounces, 1 for trees, 2 for each of two kinds and 1 for their being two
     assert int(kernels) == 15
+
+
+def test_the_table_of_shapes_says_what_their_modules_have():
+    names = {path.stem for path in (ROOT / "rtcore" / "shapes").glob("*.py") if not path.stem.startswith("_")}
+    assert set(MODULES) == names - {"kind"}
+    textbook = []
+    for module, listed in MODULES.items():
+        held = vars(importlib.import_module(f"rtcore.shapes.{module}")).values()
+        assert {value.__name__ for value in held if isinstance(value, type) and issubclass(value, Shape) and value is not Shape} == set(
+            listed.shapes)
+        kinds = [value for value in held if isinstance(value, Kind)]
+        assert [kind.name for kind in kinds] == list(listed.kinds) and kinds == [kind_named(name) for name in listed.kinds]
+        textbook += [kind.name for kind in kinds if kind.textbook is not None]
+    assert tuple(textbook) == TEXTBOOK
+
+
+def test_a_scene_imports_the_shapes_that_it_has(tmp_path):
+    (tmp_path / "a.yaml").write_text("rayscope: 1\nscene:\n- torus: {major_radius: 1, minor_radius: 0.25}\n")
+    code = (f"import sys, rtcore; from rtcore.plan import plan; from rtcore.settings import Settings\n"
+            f"plan(rtcore.load({str(tmp_path / 'a.yaml')!r}), Settings())\n"
+            "print(*(n.rpartition('.')[2] for n in sys.modules if n.startswith('rtcore.shapes.')))")
+    assert set(MODULES) & set(python(code).split()) == {"torus"}
 
 
 @pytest.mark.parametrize("name", ["crossings", "render", "Sphere"])

@@ -79,6 +79,27 @@ print("well")
 """
 
 
+#: Prints groups whose kernels are in other modules than those by which it is told whether they are in the cache.
+WHERE = """
+import sys
+from numba.core.dispatcher import Dispatcher
+from rtcore.jit import Cache
+from rtcore.warm import GROUPS, compile_kernels
+
+def loaded():
+    return {(value.py_func.__module__, value.py_func.__name__, str(signature)) for name, module in list(sys.modules.items())
+            if name.startswith("rtcore.") for value in vars(module).values()
+            if isinstance(value, Dispatcher) and isinstance(value._cache, Cache) for signature in value.signatures}
+
+before = set()
+for group, (modules, _) in GROUPS.items():
+    compile_kernels([f"{group}.f64"])
+    now = loaded()
+    print(*(f"{group}: {module}.{name}" for module, name, _ in now - before if module not in modules), end=" ")
+    before = now
+"""
+
+
 def python(*arguments, cache=None):
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     if cache is not None:
@@ -99,6 +120,12 @@ def test_nothing_compiles_once_all_is_warm():
     """With the user's own cache, where most of it is already: what counts is that a render adds nothing."""
     run = python("-W", "error", "-c", WARM)
     assert run.returncode == 0 and run.stdout == "well\n", run.stderr
+
+
+def test_a_group_is_known_to_be_there_by_the_modules_of_its_kernels():
+    run = python("-c", WHERE)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.split() == []
 
 
 def test_helper_process_tells_its_progress(tmp_path):

@@ -1,18 +1,16 @@
-"""Scene files: one file a format. Listed once, here, and imported when a file of that format is opened."""
+"""Scene files: one file a format. Listed once, in `_formats.py`, and imported when a file of that format is opened."""
 import importlib
 import os
 
 import numpy as np
 
-from rtcore.files import _meshes, image, scene
+from rtcore.files import image
 from rtcore.files._errors import FileError, WriteError, unknown
+from rtcore.files._formats import FORMATS
 from rtcore.files._writing import writable, write_file
 from rtcore.files.image import save_image
-from rtcore.files.scene import save
 from rtcore.scene import Scene
 
-#: Module of each format, which has load(path) -> Scene, and the suffixes of its files.
-FORMATS = {"scene": scene.SUFFIXES, "nff": (".nff",), "mesh": _meshes.SUFFIXES}
 LOADABLE = tuple(suffix for suffixes in FORMATS.values() for suffix in suffixes)
 PICTURES = image.SUFFIXES
 
@@ -30,3 +28,8 @@ def load(path: str | os.PathLike) -> Scene:
                 return importlib.import_module(f"rtcore.files.{name}").load(path)
     expected, got = unknown(suffix or os.path.basename(path), LOADABLE)
     raise FileError.expected(path, "a name that ends in " + expected, got)
+
+
+def save(scene: Scene, path: str | os.PathLike) -> None:
+    """Write a scene as YAML or JSON; see `rtcore.files.scene.save`."""
+    importlib.import_module("rtcore.files.scene").save(scene, path)

@@ -15,12 +15,13 @@ import numpy as np
 
 from rtcore.fields import FieldError
 from rtcore.files._errors import FileError, Said, read_bytes, reason
+from rtcore.files._formats import FORMATS
 from rtcore.files._looks import look_of
 from rtcore.files._sound import sound
 from rtcore.scene import Material
 from rtcore.shapes import Mesh
 
-SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+SUFFIXES = FORMATS["mesh"]
 MOST_BYTES = 1 << 30
 MOST_FACES = 10_000_000
 MOST_BESIDE = 256 << 20     # of a material, texture or buffer that a mesh names

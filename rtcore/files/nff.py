@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtcore import shapes
 from rtcore.camera import Camera
 from rtcore.fields import FieldError, linear_from_srgb
 from rtcore.files._errors import FileError, Said, read_text, unknown
 from rtcore.files._outlines import normals_filled, triangles_of
 from rtcore.lights import Ambient, Point
 from rtcore.scene import Background, Material, Node, Scene
-from rtcore.shapes import Cone, Cylinder, Mesh, Polygon, Sphere
 
 MOST_BYTES = 64 * 2**20
 AMBIENT = linear_from_srgb(0.1)
@@ -154,7 +154,7 @@ class _Reader:
         if radius == 0:
             raise self._wrong("a radius other than 0", radius)
         fill = self._fill("sphere")
-        fill.spheres.append(Node(shape=Sphere(center=(x, y, z), radius=abs(radius), sides=_turned(fill.sides, radius < 0))))
+        fill.spheres.append(Node(shape=shapes.Sphere(center=(x, y, z), radius=abs(radius), sides=_turned(fill.sides, radius < 0))))
 
     def _read_c(self):
         *base, base_radius, x, y, z, apex_radius = self._numbers(8, "base and apex of a cone, with their radii")
@@ -163,9 +163,9 @@ class _Reader:
             raise self._wrong("two radii of the same sign", Said(f"{base_radius:g} and {apex_radius:g}"))
         sides = _turned(fill.sides, base_radius < 0 or apex_radius < 0)
         if base_radius == apex_radius:
-            shape = Cylinder(base=base, apex=apex, radius=abs(base_radius), capped=False, sides=sides)
+            shape = shapes.Cylinder(base=base, apex=apex, radius=abs(base_radius), capped=False, sides=sides)
         else:
-            shape = Cone(base=base, base_radius=abs(base_radius), apex=apex, apex_radius=abs(apex_radius), capped=False, sides=sides)
+            shape = shapes.Cone(base=base, base_radius=abs(base_radius), apex=apex, apex_radius=abs(apex_radius), capped=False, sides=sides)
         fill.tubes.append(Node(shape=shape))
 
     def _read_p(self):
@@ -177,7 +177,7 @@ class _Reader:
         elif count == 3:
             fill.triangles.append(numbers)
         else:
-            fill.polygons.append(Node(shape=Polygon(vertices=corners)))
+            fill.polygons.append(Node(shape=shapes.Polygon(vertices=corners)))
 
     def _read_pp(self):
         count = self._count("patch")
@@ -237,13 +237,13 @@ def _nodes_of(fill: _Fill) -> list[Node]:
     if fill.triangles:
         corners = np.array(fill.triangles).reshape(-1, 3)
         faces = np.arange(len(corners)).reshape(-1, 3)
-        nodes.append(Node(name=_counted(len(faces), "triangle"), shape=Mesh(vertices=corners, faces=faces)))
+        nodes.append(Node(name=_counted(len(faces), "triangle"), shape=shapes.Mesh(vertices=corners, faces=faces)))
     if fill.patches:
         corners = np.array(fill.patches).reshape(-1, 6)
         vertices, faces = corners[:, :3].copy(), np.arange(len(corners)).reshape(-1, 3)
-        nodes.append(Node(name=_counted(len(faces), "patch", "patches"),
-                          shape=Mesh(vertices=vertices, faces=faces, normals=normals_filled(vertices, faces, corners[:, 3:].copy()))))
-    cones = sum(isinstance(node.shape, Cone) for node in fill.tubes)
+        mesh = shapes.Mesh(vertices=vertices, faces=faces, normals=normals_filled(vertices, faces, corners[:, 3:].copy()))
+        nodes.append(Node(name=_counted(len(faces), "patch", "patches"), shape=mesh))
+    cones = sum(isinstance(node.shape, shapes.Cone) for node in fill.tubes)
     tubes = ("cone",) if cones == len(fill.tubes) else ("cylinder",) if not cones else ("cone or cylinder", "cones and cylinders")
     for members, words in ((fill.polygons, ("polygon",)), (fill.tubes, tubes), (fill.spheres, ("sphere",))):
         if len(members) == 1:

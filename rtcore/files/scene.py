@@ -18,16 +18,16 @@ import numpy as np
 from rtcore.camera import Camera
 from rtcore.fields import FieldError, Record, fields_of, number
 from rtcore.files._errors import FileError, Said, WriteError, read_text, unknown
-from rtcore.files._meshes import MeshFiles
+from rtcore.files._formats import FORMATS
 from rtcore.files._writing import write_file
 from rtcore.files._yaml import TextError, line_of, parse
 from rtcore.files._yamlout import Block, Lines, dump
 from rtcore.lights import LIGHTS
 from rtcore.scene import MOST_NESTED, TRANSFORMS, Background, Fog, Material, Node, Scale, Scene
-from rtcore.shapes import SHAPES, Mesh
+from rtcore.shapes import SHAPE_MODULES, shape_named
 
 VERSION = 1
-SUFFIXES = (".yaml", ".yml", ".json")
+SUFFIXES = FORMATS["scene"]
 MOST_BYTES = 64 * 2**20
 
 
@@ -35,7 +35,8 @@ def _by_word(classes: tuple[type, ...]) -> dict[str, type]:
     return {cls.__name__.lower(): cls for cls in classes}
 
 
-SHAPE_WORDS, LIGHT_WORDS, TRANSFORM_WORDS = _by_word(SHAPES), _by_word(LIGHTS), _by_word(TRANSFORMS)
+LIGHT_WORDS, TRANSFORM_WORDS = _by_word(LIGHTS), _by_word(TRANSFORMS)
+SHAPE_WORDS = {name.lower(): name for name in SHAPE_MODULES}
 NODE_WORDS = tuple(name for name in fields_of(Node) if name not in ("shape", "children", "use"))
 PLACES = (*SHAPE_WORDS, "group", "use")     # a node has exactly one of these
 ARRAYS = ("vertices", "faces", "normals")     # of a mesh; its file has them
@@ -132,11 +133,20 @@ def _within(place: str, read, *args):
         raise error.inside(place) from None
 
 
-class _Reader:
-    """Plain data to records. Paths inside errors are relative to the value at hand; callers put their own step before them."""
+class _Beside:
+    """What reads or writes a scene in a folder, where the files of its meshes are."""
 
     def __init__(self, folder: str):
-        self._meshes = MeshFiles(folder)
+        self._folder = folder
+
+    @functools.cached_property
+    def _meshes(self):
+        from rtcore.files._meshes import MeshFiles      # here, for most scenes name no file
+        return MeshFiles(self._folder)
+
+
+class _Reader(_Beside):
+    """Plain data to records. Paths inside errors are relative to the value at hand; callers put their own step before them."""
 
     def scene(self, data: Any) -> Scene:
         data = _mapping(data, f"a mapping that begins with rayscope: {VERSION}")
@@ -205,12 +215,12 @@ class _Reader:
         elif word == "use":
             found["use"] = _within(word, _name, data[word])
         else:
-            found["shape"] = _within(word, self.shape, SHAPE_WORDS[word], data[word])
+            found["shape"] = _within(word, self.shape, shape_named(SHAPE_WORDS[word]), data[word])
         return Node(**found)
 
     def shape(self, cls: type, data: Any):
-        if cls is Mesh and isinstance(data, dict) and "file" in data and "vertices" not in data:
-            _refuse_unknown(data, [name for name in fields_of(Mesh) if name not in ARRAYS])
+        if cls.__name__ == "Mesh" and isinstance(data, dict) and "file" in data and "vertices" not in data:
+            _refuse_unknown(data, [name for name in fields_of(cls) if name not in ARRAYS])
             mesh = _within("file", self._meshes.mesh, data["file"])
             return mesh if set(data) == {"file"} else msgspec.structs.replace(mesh, **{**data, "file": mesh.file})
         return self.record(cls, data)
@@ -246,11 +256,8 @@ def _name(value: Any) -> str:
     return value
 
 
-class _Writer:
+class _Writer(_Beside):
     """Records to plain data: what `_Reader` reads. Fields that have their default are left out."""
-
-    def __init__(self, folder: str):
-        self._meshes = MeshFiles(folder)
 
     def scene(self, scene: Scene) -> dict:
         data: dict[str, Any] = Block(rayscope=VERSION)
@@ -289,7 +296,7 @@ class _Writer:
         return data
 
     def shape(self, shape) -> dict:
-        name = self._meshes.name_of(shape) if isinstance(shape, Mesh) and shape.file else None
+        name = self._meshes.name_of(shape) if getattr(shape, "file", None) else None
         return self.record(shape) if name is None else {"file": name, **self.record(shape, without=(*ARRAYS, "file"))}
 
     def one_word(self, record: Record) -> dict:
