@@ -13,7 +13,7 @@ from app.panels.base import Panel, button
 from app.report import Report, ReportError, Row, read
 from app.session import Session
 from app.theme import DARK, Theme
-from rtcore.shapes import SHAPES
+from rtcore.shapes import SHAPE_MODULES
 
 ALL = "all shapes"
 TABS = ("Work and precision", "Distance", "Scale", "Worst rows")
@@ -43,7 +43,7 @@ class StabilityPanel(Panel):
         self.measuring.progressed.connect(self._progress)
         self.measuring.ended.connect(self._ended)
         self.measured, self.amount, self.shown = QComboBox(), QComboBox(), QComboBox()
-        self.measured.addItems([ALL, *(shape.__name__.lower() for shape in SHAPES)])
+        self.measured.addItems([ALL, *(name.lower() for name in SHAPE_MODULES)])
         self.amount.addItems(["quick, within a minute", "full, takes long"])
         for combo, name, tip in ((self.measured, "Shape to measure", "Which shape to measure"),
                                  (self.amount, "Size of the report", "How many rays are measured"),
