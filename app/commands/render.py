@@ -152,7 +152,6 @@ def interruptible() -> Iterator:
 @contextlib.contextmanager
 def compile_time() -> Iterator:
     """A context that yields a function: seconds that numba has compiled within it."""
-    import rtcore  # noqa: F401 -- before numba, whose cache folder it sets
     from numba.core import event
     timer = event.TimingListener()
     with event.install_listener("numba:compile", timer):
