@@ -219,7 +219,7 @@ class _Reader(_Beside):
         return Node(**found)
 
     def shape(self, cls: type, data: Any):
-        if cls.__name__ == "Mesh" and isinstance(data, dict) and "file" in data and "vertices" not in data:
+        if "file" in fields_of(cls) and isinstance(data, dict) and "file" in data and "vertices" not in data:
             _refuse_unknown(data, [name for name in fields_of(cls) if name not in ARRAYS])
             mesh = _within("file", self._meshes.mesh, data["file"])
             return mesh if set(data) == {"file"} else msgspec.structs.replace(mesh, **{**data, "file": mesh.file})
