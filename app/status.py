@@ -1,8 +1,9 @@
 """The status bar: how far the picture is, how fast, and what is under the cursor. Every part has its place, so nothing jumps."""
 import math
 
-from PySide6.QtCore import Qt, Slot
-from PySide6.QtWidgets import QLabel, QSizePolicy, QStatusBar, QWidget
+from PySide6.QtCore import QSize, Qt, Slot
+from PySide6.QtGui import QPainter
+from PySide6.QtWidgets import QSizePolicy, QStatusBar, QWidget
 
 from app.forecast import Forecast, left_text
 from app.options import Options
@@ -69,6 +70,37 @@ def elapsed_text(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
 
 
+class Figure(QWidget):
+    """A line of text in a place of its own, shortened where it does not fit. A QLabel asks for a place anew with each text: all docks, tabs
+    and bars of the window were laid out and painted again with every frame, which took twice as long as the frame itself."""
+
+    def __init__(self, name: str, tip: str, align: Qt.AlignmentFlag):
+        super().__init__()
+        self._text, self._align = "", align | Qt.AlignmentFlag.AlignVCenter
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+
+    def text(self) -> str:
+        """What stands there."""
+        return self._text
+
+    def setText(self, text: str):
+        """Show another text."""
+        if text != self._text:
+            self._text = text
+            self.setAccessibleDescription(text)
+            self.update()
+
+    def sizeHint(self) -> QSize:
+        return QSize(0, self.fontMetrics().height() + 2)
+
+    def paintEvent(self, _):
+        with QPainter(self) as painter:
+            place = self.contentsRect()
+            shown = self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, place.width())
+            self.style().drawItemText(painter, place, self._align, self.palette(), True, shown, self.foregroundRole())
+
+
 class Status(QStatusBar):
     """Left what is under the cursor, right the numbers, each of a fixed width."""
 
@@ -77,22 +109,18 @@ class Status(QStatusBar):
         self._session = session
         self.setSizeGripEnabled(False)
         self.setAccessibleName("Status")
-        self.under = QLabel()
+        self.under = Figure("Under the cursor", "What is under the cursor", Qt.AlignmentFlag.AlignLeft)
         self.under.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.under.setToolTip("What is under the cursor")
-        self.under.setAccessibleName("Under the cursor")
         self.under.setContentsMargins(8, 0, 0, 0)
         self.addWidget(self.under, 1)
-        self.parts: dict[str, QLabel] = {}
+        self.parts: dict[str, Figure] = {}
         self._forecast = Forecast()
         for name, widest, tip in (*PARTS[-2:], *PARTS[:-2]):
-            label = QLabel()
-            label.setToolTip(tip)
-            label.setAccessibleName(name.capitalize())
-            label.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            label.setFixedWidth(label.fontMetrics().horizontalAdvance(widest) + 10)
-            self.addPermanentWidget(label)
-            self.parts[name] = label
+            part = Figure(name.capitalize(), tip, Qt.AlignmentFlag.AlignRight)
+            part.setContentsMargins(0, 0, 6, 0)
+            part.setFixedWidth(part.fontMetrics().horizontalAdvance(widest) + 10)
+            self.addPermanentWidget(part)
+            self.parts[name] = part
         session.frame_changed.connect(self._frame)
         session.paused_changed.connect(self._frame)
         session.hover_changed.connect(self._hover)
@@ -121,8 +149,8 @@ class Status(QStatusBar):
         else:
             name = self._session.name_of(under.place) if under.place else "Background"
             texts = name, f"{under.x}, {under.y}", f"at {under.distance:.5g}" if math.isfinite(under.distance) else ""
-        for label, text in zip((self.under, self.parts["pixel"], self.parts["distance"]), texts):
-            label.setText(text)
+        for part, text in zip((self.under, self.parts["pixel"], self.parts["distance"]), texts):
+            part.setText(text)
 
     @Slot()
     def _compiling(self):

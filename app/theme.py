@@ -138,7 +138,7 @@ QSlider::handle:horizontal:hover, QSlider::handle:horizontal:focus { border: 2px
 
 QStatusBar { background: %(window)s; color: %(muted)s; }
 QStatusBar::item { border: none; }
-QStatusBar QLabel { color: %(muted)s; padding: 1px 0; }
+QStatusBar QWidget { color: %(muted)s; }
 
 QLabel[role="label"] { color: %(muted)s; }
 QLabel[role="hint"] { color: %(muted)s; }

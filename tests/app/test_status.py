@@ -2,6 +2,7 @@
 import math
 
 import pytest
+from PySide6.QtCore import QEvent, QObject
 
 from app.forecast import Forecast, left_text
 from app.options import Options
@@ -25,6 +26,30 @@ def test_the_bar_tells_samples_error_and_time_left(window, session, double, sett
         assert (parts["pass"].text(), parts["error"].text(), parts["left"].text()) == (word, error, left)
         for name in ("pass", "error", "left"):
             assert parts[name].fontMetrics().horizontalAdvance(parts[name].text()) <= parts[name].width()
+
+
+class Layouts(QObject):
+    """Counts how often a widget is asked to lay out what is on it."""
+
+    count = 0
+
+    def eventFilter(self, widget, event):
+        self.count += event.type() == QEvent.Type.LayoutRequest
+        return False
+
+
+def test_a_text_moves_nothing_in_the_window(window, session, settled, qtbot):
+    settled(session)
+    qtbot.wait(50)      # what is still on its way
+    bar, layouts = window.statusBar(), Layouts()
+    places = {name: part.geometry() for name, part in bar.parts.items()}
+    window.installEventFilter(layouts)
+    for text in ("", "1", "what is far longer than any text for which there is room"):
+        for part in (bar.under, *bar.parts.values()):
+            part.setText(text)
+            assert part.text() == part.accessibleDescription() == text
+        qtbot.wait(20)
+    assert layouts.count == 0 and {name: part.geometry() for name, part in bar.parts.items()} == places
 
 
 def test_texts():
