@@ -1,4 +1,7 @@
 """Formulas: what is read and what is refused, and that intervals hold what they should."""
+import ast
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,17 +10,37 @@ from hypothesis import strategies as st
 from rtcore import FieldError, Implicit
 from rtcore.reports.formulas import precise, tree, value
 from rtcore.reports.oracle import mp
-from rtcore.shapes._formula import MOST_CHARACTERS, compiled
+from rtcore.shapes._formula import CONSTANT_FUNCTIONS, MOST_CHARACTERS, compiled
 from rtcore.shapes._tape import AT_ROWS, DIRECTION, GONE, INPUT, ROUGH, SLOPE, VALUE, new_registers, run
 
-NAMES = precise(mp)
+def real(function):
+    """A function that takes no value from outside a domain: `abs` would bring back a power's complex one, `min` lose a NaN."""
+    def checked(*numbers):
+        if any(isinstance(number, mp.mpc) or mp.isnan(number) for number in numbers):
+            raise ValueError
+        return function(*numbers)
+    return checked
+
+
+NAMES = {name: real(meaning) if callable(meaning) else meaning for name, meaning in precise(mp).items()}
 REGISTERS = new_registers.py_func()
+
+
+class Constants(ast.NodeTransformer):
+    """Works out in float64 what no variable is in, as the formula's reader does: that is the number which the formula has."""
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        if isinstance(node, ast.expr) and not any(isinstance(one, ast.Name) and one.id in "xyz" for one in ast.walk(node)):
+            return ast.Constant(value(node, CONSTANT_FUNCTIONS | {"pi": math.pi}))
+        if isinstance(node, ast.Call):
+            return ast.Call(node.func, [self.visit(argument) for argument in node.args], [])
+        return self.generic_visit(node)
 
 
 def exact(text: str, point) -> object:
     """The value in 50 digits, read by Python's own parser; NaN outside the domain."""
     try:
-        return value(tree(text), NAMES | dict(zip("xyz", (mp.mpf(float(p)) for p in point))), mp.mpf)
+        return value(Constants().visit(tree.__wrapped__(text)), NAMES | dict(zip("xyz", (mp.mpf(float(p)) for p in point))), mp.mpf)
     except (ZeroDivisionError, OverflowError, ValueError):
         return mp.nan
 

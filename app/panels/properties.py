@@ -1,6 +1,6 @@
 """The property editor: forms made from the fields of whatever is selected."""
 import time
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
 
 import msgspec
@@ -21,55 +21,140 @@ NEW_TRANSFORMS = (Translate((0, 0, 0)), Rotate((0, 1, 0), 0), Scale((1, 1, 1)), 
                   Matrix(((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))))
 INHERITED, OWN = "inherited", "own"
 SLICE = 0.002       # s of building at a time: a node's forms take 20 to 40 ms, in which the picture could not be moved
+KEPT = 16           # bodies of forms that are kept: to build one again takes 20 to 40 ms, to show it 1
+APART = 20          # ms between two forms of a body that is taken down: all together they take 10 ms
+
+
+class Body(QWidget):
+    """The forms for all things of one structure, in a column. Which of them they show, the panel says."""
+
+    def __init__(self):
+        super().__init__()
+        self.column = QVBoxLayout(self)
+        self.column.setContentsMargins(0, 0, 0, 0)
+        self.column.setSpacing(8)
+        self.rest: Iterator[None] = iter(())        # what is still to be built
+        self.forms: dict[str, Form] = {}
+        self.others: list[Hint | MaterialPicker] = []       # that show what is selected as well
+
+    def place(self, widget: QWidget):
+        """Below the others."""
+        self.column.addWidget(widget)
+
+    def hint(self, text: Callable[[], str]):
+        """A line of text, which tells of what is selected."""
+        hint = Hint(text)
+        self.others.append(hint)
+        self.place(hint)
+
+    def refresh(self):
+        """Show what is selected as it is now."""
+        for part in (*self.forms.values(), *self.others):
+            part.refresh()
+
+
+class Hint(QLabel):
+    """A line of text that may change."""
+
+    def __init__(self, text: Callable[[], str]):
+        super().__init__(text())
+        self._told = text
+        self.setProperty("role", "hint")
+        self.setWordWrap(True)
+
+    def refresh(self):
+        """Say it as it is now."""
+        if (text := self._told()) != self.text():
+            self.setText(text)
 
 
 class PropertiesPanel(Panel):
-    """Rebuilt when another kind of thing is selected, row by row between other events; while its structure stays, only the values are
-    shown anew."""
+    """Forms are built once for all things of one structure, row by row between other events, and kept; what is selected, and what an edit
+    changes, is only shown in them."""
 
     title, icon, tip = "Properties", "properties", "Everything about what is selected"
 
     def __init__(self, session: Session, parent: QWidget | None = None):
         super().__init__(session, parent)
         self._theme: Theme = DARK
-        self._built: object = None
-        self._rest: Iterator[None] = iter(())       # what is still to be built
+        self._place: Place | None = None            # what the forms show
+        self._bodies: OrderedDict[tuple, Body] = OrderedDict()      # by structure; the last one is seen
         self._soon = QTimer(self, interval=0)
         self._soon.timeout.connect(self._build_on)
-        self.forms: dict[str, Form] = {}
-        self._pickers: list[MaterialPicker] = []
+        self.column.addStretch(1)
         session.document.changed.connect(self.refresh)
         session.selection_changed.connect(self.refresh)
         self.refresh()
 
+    @property
+    def body(self) -> Body:
+        """The one that is seen."""
+        return next(reversed(self._bodies.values()))
+
+    @property
+    def forms(self) -> dict[str, Form]:
+        """Those that are seen, by name."""
+        return self.body.forms
+
     def dress(self, theme: Theme):
-        self._theme, self._built = theme, None
+        self._theme = theme
+        while self._bodies:
+            self._drop_oldest()
         self.refresh()
 
     @Slot()
     def refresh(self):
         """Show what is selected as it is now."""
-        place = self.session.selection
+        another = self.session.selection != self._place
+        if another:
+            self._leave()
+        self._place = place = self.session.selection
         record = record_at(self.session.scene, place) if place is not None else None
-        structure = (place, self._structure(record))
-        if structure != self._built:
-            self._built = structure
-            self._clear()
-            self._rest = self._build(place, record)
-            self._build_on()
-        for form in self.forms.values():
-            form.refresh()
-        for picker in self._pickers:
-            picker.refresh()
+        structure = self._structure(record)
+        if not self._bodies or structure != next(reversed(self._bodies)):
+            self._show(structure, record)
+            if another:
+                self.verticalScrollBar().setValue(0)
+        self.body.refresh()
+
+    def _leave(self):
+        """What is being typed belongs to what was selected until now."""
+        focus = self.focusWidget()
+        if focus is not None and focus.hasFocus():
+            focus.clearFocus()
+        self.session.seal()
+
+    def _show(self, structure: tuple, record: Record | None):
+        """Bring the body for a structure to the front, made if there is none."""
+        if self._bodies:
+            self.body.hide()
+        if structure not in self._bodies:
+            self._bodies[structure] = body = Body()
+            body.rest = self._build(body, record)
+            self.column.insertWidget(0, body)
+        self._bodies.move_to_end(structure)
+        self._build_on()
+        self.body.show()
+        while len(self._bodies) > KEPT:
+            self._drop_oldest()
+
+    def _drop_oldest(self):
+        _, body = self._bodies.popitem(last=False)
+        self.column.removeWidget(body)
+        body.hide()
+        for i, form in enumerate(body.forms.values()):
+            QTimer.singleShot(i * APART, form, form.deleteLater)
+        QTimer.singleShot(len(body.forms) * APART, body, body.deleteLater)
 
     def _structure(self, record: Record | None) -> tuple:
         """What decides which editors there are."""
         if not isinstance(record, Node):
             return type(record), isinstance(record, Material) and record.checker is not None
+        part = definition_around(self.session.scene, self._place.key) is not None
         points = [len(value) for value in (getattr(record.shape, name) for name in getattr(type(record.shape), "__struct_fields__", ()))
                   if isinstance(value, tuple) and value and isinstance(value[0], tuple) and len(value) <= MOST_ROWS]
         material = self._material(record)
-        return (type(record.shape), points, [type(t) for t in record.transform], material is None, type(record.material),
+        return (Node, part, type(record.shape), tuple(points), tuple(map(type, record.transform)), material is None, type(record.material),
                 material is not None and material.checker is not None, tuple(self.session.scene.materials))
 
     def _material(self, node: Node) -> Material | None:
@@ -78,7 +163,8 @@ class PropertiesPanel(Panel):
 
     def complete(self):
         """Build what is still to be built."""
-        deque(self._rest, maxlen=0)
+        deque(self.body.rest, maxlen=0)
+        self._build_on()
 
     # building: generators, a step of which is some 1 ms of work
 
@@ -86,54 +172,58 @@ class PropertiesPanel(Panel):
     def _build_on(self):
         until = time.perf_counter() + SLICE
         while time.perf_counter() < until:
-            if next(self._rest, self) is self:
+            if next(self.body.rest, self) is self:
                 self.widget().setUpdatesEnabled(True)
                 return self._soon.stop()
         self.widget().setUpdatesEnabled(False)      # what was there is seen until all of the new is
         self._soon.start()
 
-    def _clear(self):
-        while (item := self.column.takeAt(0)) is not None:
-            if item.widget() is not None:
-                item.widget().hide()
-                item.widget().deleteLater()
-        self.column.addStretch(1)
-        self.forms, self._pickers = {}, []
+    def _record(self) -> Record:
+        """What is selected."""
+        return record_at(self.session.scene, self._place)
 
-    def _build(self, place: Place | None, record: Record | None) -> Iterator[None]:
+    def _commit(self, record: Record, label: str, merge: object):
+        """Put another record in the place of what is selected."""
+        self.session.edit_record(self._place, record, f"{label_of(self.session.scene, self._place)}: {label}", merge)
+
+    def _build(self, body: Body, record: Record | None) -> Iterator[None]:
         if record is None:
-            self._add_hint("Click an object in the picture or in the scene tree to see and change its properties.")
+            body.hint(lambda: "Click an object in the picture or in the scene tree to see and change its properties.")
         elif isinstance(record, Node):
-            yield from self._build_node(place, record)
+            yield from self._build_node(body, record)
         else:
-            title = label_of(self.session.scene, place)
-            self._add_hint(title if place.kind == "background" else f"{type(record).__name__} “{title}”")
-            form = RecordForm(lambda: record_at(self.session.scene, place), self._commit(place), self.session.seal, slowly=True)
-            yield from self._add("record", form)
+            body.hint(self._heading)
+            form = RecordForm(self._record, self._commit, self.session.seal, slowly=True)
+            yield from self._add(body, "record", form)
             if isinstance(record, Material):
-                yield from self._build_checker(lambda: record_at(self.session.scene, place), self._commit(place), form)
+                yield from self._build_checker(body, self._record, self._commit, form)
 
-    def _build_node(self, place: Place, node: Node) -> Iterator[None]:
-        def read() -> Node:
-            return record_at(self.session.scene, place)
-        commit = self._commit(place)
-        if (name := definition_around(self.session.scene, place.key)) is not None:
-            self._add_hint(f"Part of the definition “{name}”: a change shows in every use of it.")
-        yield from self._add("node", RecordForm(read, commit, self.session.seal, only=("name", "visible", "note"), slowly=True))
+    def _heading(self) -> str:
+        title = label_of(self.session.scene, self._place)
+        return title if self._place.kind == "background" else f"{type(self._record()).__name__} “{title}”"
+
+    def _build_node(self, body: Body, node: Node) -> Iterator[None]:
+        read, commit = self._record, self._commit
+
+        def part() -> str:
+            return definition_around(self.session.scene, self._place.key)
+        if part() is not None:
+            body.hint(lambda: f"Part of the definition “{part()}”: a change shows in every use of it.")
+        yield from self._add(body, "node", RecordForm(read, commit, self.session.seal, only=("name", "visible", "note"), slowly=True))
         if node.shape is not None:
             def commit_shape(shape, label, merge):
                 commit(msgspec.structs.replace(read(), shape=shape), label, merge)
             form = RecordForm(lambda: read().shape, commit_shape, self.session.seal, slowly=True)
-            yield from self._add("shape", form, type(node.shape).__name__)
-        yield from self._build_transforms(read, commit)
-        yield from self._build_material(read, commit)
+            yield from self._add(body, "shape", form, type(node.shape).__name__)
+        yield from self._build_transforms(body, read, commit)
+        yield from self._build_material(body, read, commit)
 
-    def _build_transforms(self, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
-        body = QWidget()
-        column = QVBoxLayout(body)
+    def _build_transforms(self, body: Body, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
+        content = QWidget()
+        column = QVBoxLayout(content)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
-        self._place(Section("Transform", body, opened=bool(read().transform)))
+        body.place(Section("Transform", content, opened=bool(read().transform)))
 
         def put(i: int, transform, label: str, merge: object):
             commit(msgspec.structs.replace(read(), transform=spliced(read().transform, i, transform)), label, merge)
@@ -154,7 +244,7 @@ class PropertiesPanel(Panel):
             column.addLayout(head)
             form = RecordForm(lambda i=i: read().transform[i], lambda t, label, merge, i=i: put(i, t, label, merge), self.session.seal,
                               slowly=True)
-            self.forms[f"transform {i}"] = form
+            body.forms[f"transform {i}"] = form
             column.addWidget(form)
             yield from form.rows
         add = QToolButton()
@@ -172,14 +262,14 @@ class PropertiesPanel(Panel):
         column.addWidget(add, 0, Qt.AlignmentFlag.AlignLeft)
         yield
 
-    def _build_material(self, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
-        body = QWidget()
-        column = QVBoxLayout(body)
+    def _build_material(self, body: Body, read: Callable[[], Node], commit: Callable) -> Iterator[None]:
+        content = QWidget()
+        column = QVBoxLayout(content)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(6)
-        self._place(Section("Material", body))
+        body.place(Section("Material", content))
         picker = MaterialPicker(self.session, read, commit)
-        self._pickers.append(picker)
+        body.others.append(picker)
         column.addWidget(picker)
         yield
         if self._material(read()) is not None:
@@ -190,12 +280,12 @@ class PropertiesPanel(Panel):
                 else:
                     commit(msgspec.structs.replace(read(), material=material), label, merge)
             form = RecordForm(lambda: self._material(read()), commit_material, self.session.seal, slowly=True)
-            self.forms["material"] = form
+            body.forms["material"] = form
             column.addWidget(form)
             yield from form.rows
-            yield from self._build_checker(lambda: self._material(read()), commit_material, form)
+            yield from self._build_checker(body, lambda: self._material(read()), commit_material, form)
 
-    def _build_checker(self, read: Callable[[], Material], commit: Callable, form: Form) -> Iterator[None]:
+    def _build_checker(self, body: Body, read: Callable[[], Material], commit: Callable, form: Form) -> Iterator[None]:
         """A check box for the pattern, and its fields while it is there."""
         def set_checker(checker, label, merge):
             commit(msgspec.structs.replace(read(), checker=checker), label, merge)
@@ -206,30 +296,14 @@ class PropertiesPanel(Panel):
             inner = RecordForm(lambda: read().checker or Checker(),
                                lambda made, label, merge: set_checker(made, f"checker {label}", merge), self.session.seal,
                                slowly=True)
-            self.forms["checker"] = inner
+            body.forms["checker"] = inner
             form.add_wide(inner)
             yield from inner.rows
 
-    def _add(self, name: str, form: RecordForm, heading: str = "") -> Iterator[None]:
-        self.forms[name] = form
-        self._place(Section(heading, form) if heading else form)
+    def _add(self, body: Body, name: str, form: RecordForm, heading: str = "") -> Iterator[None]:
+        body.forms[name] = form
+        body.place(Section(heading, form) if heading else form)
         yield from form.rows
-
-    def _place(self, widget: QWidget):
-        """Below the others, above the empty rest."""
-        self.column.insertWidget(self.column.count() - 1, widget)
-
-    def _add_hint(self, text: str):
-        label = QLabel(text)
-        label.setProperty("role", "hint")
-        label.setWordWrap(True)
-        self._place(label)
-
-    def _commit(self, place: Place) -> Callable[[Record, str, object], None]:
-        def commit(record: Record, label: str, merge: object):
-            name = label_of(self.session.scene, place)
-            self.session.edit_record(place, record, f"{name}: {label}", merge)
-        return commit
 
 
 class MaterialPicker(QWidget):
