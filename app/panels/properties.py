@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from app.editors import FlagEdit
-from app.forms import MOST_ROWS, Form, RecordForm, Section
+from app.forms import Form, RecordForm, Section
 from app.icons import icon
 from app.panels.base import Panel, small_button
 from app.places import Place, definition_around, label_of, record_at, spliced
@@ -152,7 +152,7 @@ class PropertiesPanel(Panel):
             return type(record), isinstance(record, Material) and record.checker is not None
         part = definition_around(self.session.scene, self._place.key) is not None
         points = [len(value) for value in (getattr(record.shape, name) for name in getattr(type(record.shape), "__struct_fields__", ()))
-                  if isinstance(value, tuple) and value and isinstance(value[0], tuple) and len(value) <= MOST_ROWS]
+                  if isinstance(value, tuple) and value and isinstance(value[0], tuple)]
         material = self._material(record)
         return (Node, part, type(record.shape), tuple(points), tuple(map(type, record.transform)), material is None, type(record.material),
                 material is not None and material.checker is not None, tuple(self.session.scene.materials))

@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from app.panels.properties import KEPT
 from app.places import Place, node_at
 from app.theme import LIGHT
-from rtcore import Box, Material, Node, Plane, Scene, Sphere, Translate
+from rtcore import Box, Material, Node, Plane, Polygon, Scene, Sphere, Translate
 
 SCENE = Scene(objects=[
     Node(name="left", shape=Sphere((-1, 0, 0), 0.5), material=Material(color=(1, 0, 0))),
@@ -37,6 +37,14 @@ def test_things_of_one_structure_share_their_forms(panel, session, qtbot):
     assert shown(panel, session, 0) is left and radius.text() == "0.5"
     assert [body.isHidden() for body in panel._bodies.values()] == [True] * (len(panel._bodies) - 1) + [False]
     qtbot.waitUntil(radius.isVisible)
+
+
+def test_lists_of_another_length_have_forms_of_their_own(panel, session):
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    session.document.open(Scene(objects=[Node(name=str(n), shape=Polygon(corners[:n])) for n in (3, 4)]), None)
+    three = shown(panel, session, 0)
+    assert len(three["shape"].editors["vertices"].entries) == 9
+    assert len(shown(panel, session, 1)["shape"].editors["vertices"].entries) == 12 and shown(panel, session, 0) is three
 
 
 def test_an_edit_goes_to_what_is_selected(panel, session, qtbot):
