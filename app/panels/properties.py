@@ -205,7 +205,7 @@ class PropertiesPanel(Panel):
     def _build_node(self, body: Body, node: Node) -> Iterator[None]:
         read, commit = self._record, self._commit
 
-        def part() -> str:
+        def part() -> str | None:
             return definition_around(self.session.scene, self._place.key)
         if part() is not None:
             body.hint(lambda: f"Part of the definition “{part()}”: a change shows in every use of it.")
