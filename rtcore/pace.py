@@ -49,13 +49,12 @@ class Pace:
                 return spacing
         return 1 if known and self._known is None else COARSEST
 
-    def edge(self, spacing: int, size: tuple[int, int], threads: int, light: bool = False) -> int:
-        """Lattice points along the edge of a tile of a picture of this size. A large one has fewer calls a ray, of which each takes some
-        microseconds of Python's lock: at 64 x 64 that was half the time of a simple scene. light: where nothing is known yet, rays are
-        expected to be few and tiles over soon."""
+    def edge(self, spacing: int, size: tuple[int, int], threads: int) -> int:
+        """Lattice points along the edge of a tile of a picture of this size, where what is met is kept. A large one has fewer calls a ray,
+        for which Python is needed there."""
         each = self.seconds(spacing)
 
         def suits(edge: int) -> bool:
-            soon = light or edge <= TILE if each is None else edge ** 2 * each <= LONG
+            soon = edge <= TILE if each is None else edge ** 2 * each <= LONG
             return soon and math.prod(-(-side // (spacing * edge)) for side in size) >= (ENOUGH if spacing == 1 else FEWER) * threads
         return next(filter(suits, EDGES), EDGES[-1])

@@ -23,7 +23,9 @@ from rtcore.recast import Recast
 from rtcore.scene import Scene
 from rtcore.schedule import COARSEST, FURTHER, TILE, Pass, further, passes, tile_order, tiles, weight
 from rtcore.settings import Settings
-from rtcore.trace import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW, Scratch, Tracer
+from rtcore.scratch import Scratch
+from rtcore.stages import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW
+from rtcore.trace import Tracer
 from rtcore.views.view import Seen
 from rtcore.wave import UNWANTED
 
@@ -98,9 +100,9 @@ class Render:
         width, height = size = self.settings.size
         view = camera.rays(width, height)
         lens = camera.lens() if self.plan.lens else None
-        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog)
         # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
         lit = self.coarse or VIEW[self.settings.view].needs_lit
+        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog, lit)
         self.gain = self.tracer.filter.gain if self.tracer.filter else 1.0
         signed = self.gain < 1
         reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit, signed)
@@ -171,10 +173,10 @@ class Render:
         one, size = self.schedule[self.number], self.settings.size
         if one.samples == range(1):
             for spacing in (*one.coarser, one.spacing):
-                self.edges.setdefault(spacing, self.pace.edge(spacing, size, len(self.scratches), not (self.coarse or self.plan.bounces)))
+                # where nothing is kept a tile takes no Python, and small ones stay in the processor's cache
+                self.edges.setdefault(spacing, TILE if self.memory is None else self.pace.edge(spacing, size, len(self.scratches)))
         else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, never larger
-            edge = self.edges.get(FURTHER, self.edges[1])
-            self.edges[FURTHER] = min(edge, TILE) if one.region else edge
+            self.edges[FURTHER] = min(self.edges.get(FURTHER, self.edges[1]), TILE)
         queue = tiles(one, *size, self.edges)
         share = weight(one, *size)
         each = share / max(len(queue), 1)
@@ -197,7 +199,7 @@ class Render:
         shares = [self.pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
         try:
             while wait(shares, LOOK, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
-                if cancelled():
+                if stale():
                     end()
                 elif (now := time.perf_counter()) - shown >= patience:
                     self.elapsed, shown, patience = now - self.prepared, now, PARTIAL
@@ -316,7 +318,7 @@ class Render:
         """Where the threads' time went so far, by (stage of the plan, kernel group)."""
         total = Counter()
         for scratch in self.scratches:
-            total.update(dict(scratch.clock.seconds))       # a copy, for its thread may be adding to it
+            total.update(scratch.clock.seconds())
         return dict(total)
 
     def held(self) -> dict[str, int]:

@@ -21,14 +21,15 @@ except ImportError:     # Windows
 from rtcore.bounds import packed_bounds
 from rtcore.edits import ANEW, KEPT, TOUCHED, Change, casting, change
 from rtcore.flatten import DTYPES, Geometry, flatten, packed, renumbering
-from rtcore.keep import NO_BOXES, UNKNOWN, Memory
+from rtcore.keep import Memory
+from rtcore.levels import NO_BOXES, UNKNOWN
 from rtcore.pace import Pace
 from rtcore.picture import PARTIAL, Frame as Frame, Render, RenderRequest, Start
 from rtcore.plan import Plan, plan
 from rtcore.scene import Scene
 from rtcore.schedule import COARSEST, LATTICES, passes, tiles
 from rtcore.settings import Settings
-from rtcore.trace import NONFINITE
+from rtcore.stages import NONFINITE
 from rtcore.wave import COUNTED
 
 KNOWN = 0.08        # seconds that a picture of known hits may take and still come whole, not lattice by lattice

@@ -17,9 +17,11 @@ from rtcore.keep import Memory, Recall
 from rtcore.lights import SAMPLED, SHINE, UNNOTED, UNTOLD, Draw, Reach
 from rtcore.plan import plan
 from rtcore.scene import Background, Fog, Material, Node, Scene
+from rtcore.scratch import Scratch
 from rtcore.settings import Settings
 from rtcore.shapes import KIND_MODULES, TEXTBOOK, kind_named
-from rtcore.trace import CLOSEST, COUNTS
+from rtcore.stages import CLOSEST, COUNTS
+from rtcore.trace import Tracer
 from rtcore.wave import NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
 
 
@@ -40,8 +42,20 @@ def _core(dtype):
     films.note_first_hits(film, wave, n, target)
     films.commit(film, sample, n, target)
     find_kinds(wave.rays.prim, n, np.zeros(0, np.int64), np.zeros(0, bool))
+    _advance(dtype)
     pixels, node, distance = np.empty((8, 8, 3), np.float32), np.empty((8, 8), np.int32), np.empty((8, 8), np.float32)
     films.develop(film, np.zeros(0, np.int32), 8, 0, 8, 1, pixels, node, distance)
+
+
+def _advance(dtype):
+    scene, settings, camera = Scene(), Settings(view="depth", precision=_precision(dtype)), Camera()
+    tracer = Tracer(flatten(scene, settings.precision), plan(scene, settings), settings, camera.rays(8, 8), None, camera.up, Background(),
+                    None, False)
+    tracer.tile(Scratch(dtype, True), films.new_film(8, 8), np.array([0, 0, 8, 8, 1, 0, 8, 8], np.int64), 0, lambda: False)
+
+
+def _precision(dtype):
+    return next(name for name, d in DTYPES.items() if d == dtype)
 
 
 def _lens(dtype):
@@ -158,8 +172,7 @@ def _light(kind):
 
 
 def _example(kind, dtype):
-    precision = next(name for name, d in DTYPES.items() if d == dtype)
-    return flatten(Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())]), precision)
+    return flatten(Scene(objects=[Node(shape=kind.example[0], transform=kind.example[1], material=Material())]), _precision(dtype))
 
 
 def _kind(name):
@@ -181,11 +194,11 @@ def _textbook(name):
 
 #: Each group: the modules that its kernels are in, and how to compile it for a precision.
 GROUPS: dict[str, tuple[tuple[str, ...], Callable]] = {
-    "core": (("rtcore.eye", "rtcore.film", "rtcore.wave"), _core), "glow": (("rtcore.film", "rtcore.shading"), _glow),
+    "core": (("rtcore.eye", "rtcore.film", "rtcore.stages", "rtcore.wave"), _core), "glow": (("rtcore.film", "rtcore.shading"), _glow),
     "doubt": (("rtcore.film",), _doubt), "samples": (("rtcore.eye", "rtcore.film"), _samples), "screen": (("rtcore.film",), _screen),
     "leaf": (("rtcore.bvh",), _leaf), "tree": (("rtcore.bvh",), _tree), "lit": (("rtcore.shading",), _lit),
     "bounce": (("rtcore.shading",), _bounce), "lens": (("rtcore.lens",), _lens), "fog": (("rtcore.fog",), _fog),
-    "rows": (("rtcore.rows",), _rows), "keep": (("rtcore.film", "rtcore.keep"), _keep), "gloss": (("rtcore.gloss",), _gloss),
+    "rows": (("rtcore.rows",), _rows), "keep": (("rtcore.film", "rtcore.levels"), _keep), "gloss": (("rtcore.gloss",), _gloss),
     "filter": (("rtcore.filters",), _filter), "adaptive": (("rtcore.adaptive",), _adaptive),
     "recast": (("rtcore.film", "rtcore.recast"), _recast),
     **{f"light-{light.__name__.lower()}": ((light.__module__,), _light(light)) for light in SHINE},

@@ -7,7 +7,8 @@ import rtcore
 from rtcore import (Ambient, Background, Box, Camera, Checker, Cylinder, Directional, Fog, Material, Mesh, Node, Plane, Point, Scale, Scene,
                     Sphere, Translate, edits)
 from rtcore.flatten import flatten, renumbering
-from rtcore.keep import BOXES, UNKNOWN
+from rtcore.keep import BOXES
+from rtcore.levels import UNKNOWN
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.settings import Settings
 

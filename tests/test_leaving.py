@@ -6,7 +6,7 @@ import pytest
 
 from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Scene, Sphere, Triangle
 from rtcore.flatten import flatten
-from rtcore.trace import CLOSEST
+from rtcore.stages import CLOSEST
 from rtcore.wave import DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
 
 RAYS = 100_000

@@ -73,8 +73,8 @@ def test_a_render_imports_and_loads_only_what_it_needs(tmp_path):
     python(code)        # once, in case kernels have to be compiled
     exit_code, kernels, *imported = python(code).split()
     assert exit_code == "0" and imported == []
-    # 4 for any picture, 2 for its light, 2 for lights, 1 for bounces, 1 for trees, 2 for each of two kinds and 1 for their being two
-    assert int(kernels) == 15
+    # 5 for any picture, 2 for its light, 2 for lights, 1 for bounces, 1 for trees, 2 for each of two kinds and 1 for their being two
+    assert int(kernels) == 16
 
 
 def test_a_command_ends_without_looking_for_garbage():

@@ -8,7 +8,7 @@ from rtcore.flatten import flatten
 from rtcore.plan import plan
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
-from rtcore.trace import CLOSEST
+from rtcore.stages import CLOSEST
 from rtcore.wave import DX, OX, START, T, new_rays
 
 KIND = [kind for kind in KINDS if kind.textbook is not None]

@@ -6,7 +6,7 @@ import rtcore
 from rtcore import Matrix, Node, Scale, Scene, Shear, Torus
 from rtcore.flatten import flatten
 from rtcore.shapes.kind import SIDES
-from rtcore.trace import CLOSEST
+from rtcore.stages import CLOSEST
 from rtcore.wave import DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
 
 DTYPES = {"f64": np.float64, "f32": np.float32}
