@@ -18,8 +18,7 @@ from rtcore.framing import framed
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.scene import Scene
 from rtcore.settings import Settings
-from rtcore.stages import CLOSEST
-from rtcore.wave import GX, OPAQUE, RAY_ROWS, SURFACE_ROWS, U, Rays, new_rays, new_tally, padded
+from rtcore.wave import CLOSEST, GX, OPAQUE, RAY_ROWS, SURFACE_ROWS, U, Rays, new_rays, new_tally, padded
 
 CHUNK = 1 << 13     # rays traced in one go: their arrays stay in the second-level cache
 KEPT = 4            # scenes and precisions whose geometry is kept for the next query

@@ -39,6 +39,8 @@ def _calling(result):
     def make(tc, address, arguments):
         def gen(ctx, b, sig, a):
             convention, kinds = ctx.call_conv, arguments.types
+            with cgutils.if_unlikely(b, cgutils.is_null(b, a[0])):
+                convention.return_user_exc(b, RuntimeError, ("a kernel is called that was left out",))
             function = b.inttoptr(a[0], convention.get_function_type(result, kinds).as_pointer())
             values = [b.extract_value(a[1], k) for k in range(len(kinds))]
             status, value = convention.call_function(b, function, result, kinds, values)

@@ -17,6 +17,7 @@ from rtcore.flatten import Geometry, nbytes
 from rtcore.keep import Memory
 from rtcore.latest import Latest
 from rtcore.leaves import Leaf
+from rtcore.memory import carved
 from rtcore.pace import Pace
 from rtcore.plan import VIEW, Plan
 from rtcore.recast import Recast
@@ -101,7 +102,7 @@ class Render:
         view = camera.rays(width, height)
         lens = camera.lens() if self.plan.lens else None
         # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
-        lit = self.coarse or VIEW[self.settings.view].needs_lit
+        lit = self.coarse or VIEW[self.settings.view].needs_lit or (before is not None and len(before.film.lit) > 0)
         self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog, lit)
         self.gain = self.tracer.filter.gain if self.tracer.filter else 1.0
         signed = self.gain < 1
@@ -331,8 +332,7 @@ class Render:
     def frame(self, done: bool) -> Frame:
         """The picture as it is now."""
         began, film, (width, height) = time.perf_counter(), self.film, self.settings.size
-        pixels = np.empty((height, width, 3), np.float32)
-        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+        pixels, node, distance = carved(((height, width, 3), np.float32), ((height, width), np.int32), ((height, width), np.float32))
         bands = [0, height]
         if not self.tracing:    # else the pool's threads have their hands full
             bands = np.linspace(0, height, len(self.scratches) + 1).astype(int).tolist()

@@ -21,11 +21,10 @@ from rtcore.lookup import OTHER, PART, Kept, compare, give_hits, give_reaches, g
 from rtcore.scene import Background, Fog
 from rtcore.sampling import LIGHTS
 from rtcore.shapes.kind import Table
-from rtcore.wave import UNWANTED, Beam, Wave, new_beam, new_wave
+from rtcore.wave import CLOSEST, UNWANTED, Beam, Wave, new_beam, new_wave
 
 LEVEL = 1 << 12         # pairs of dimensions for the lights of one depth: so a light more changes nothing about the others
 SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
-CLOSEST = np.zeros(0, np.int32)     # no opacities: record() keeps the nearest hit
 
 #: What is counted.
 COUNTS = ("reflection", "refraction", "primary", "primary_hits", "shadow", "shadow_hits", "nonfinite")
@@ -180,7 +179,7 @@ def _shine(program, state, film, wave, n, since):
     """The rays from a wave's hits toward the lights at hand, into the beam; returns the time."""
     s, beam, lamps = state.numbers, state.beam, program.lamps
     first, m, depth = s[LAMP], 0, s[DEPTH]
-    lit = film.lit if s[FIRST] != 0 and depth == 1 else film.lit[:0]
+    lit = film.lit if s[FIRST] != 0 and depth == 1 and program.stages[NOTES_LIT] != 0 else film.lit[:0]
     share = np.float32(1 / lamps.shape[0])
     for j in range(first, s[LAST_LAMP]):
         lamp = value_at(program.numbers, j, program.lamp)
@@ -277,7 +276,7 @@ def advance(program, state, film):
             if m > 0:
                 if stages[SHADOWED] != 0:
                     counts[SHADOW] += m - s[KNOWN_SHADOWS]
-                if s[FIRST] != 0 and depth == 1 and film.lit.shape[0] > 0:
+                if s[FIRST] != 0 and depth == 1 and stages[NOTES_LIT] != 0:
                     call(stages[NOTES_LIT], (film, beam, m, state.target, np.float32(1 / lamps)))
                 counts[SHADOW_HITS] += count_of(stages[GATHERS], (wave, beam, m))
                 since = _lap(spent, LAPS + 2 * first + 1, since)

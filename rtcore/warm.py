@@ -20,9 +20,9 @@ from rtcore.scene import Background, Fog, Material, Node, Scene
 from rtcore.scratch import Scratch
 from rtcore.settings import Settings
 from rtcore.shapes import KIND_MODULES, TEXTBOOK, kind_named
-from rtcore.stages import CLOSEST, COUNTS
+from rtcore.stages import COUNTS
 from rtcore.trace import Tracer
-from rtcore.wave import NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
+from rtcore.wave import CLOSEST, NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
 
 
 def _wave(dtype):

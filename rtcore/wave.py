@@ -3,7 +3,6 @@
 Arrays are C-contiguous, a row a quantity, a column a ray; the number of columns is a multiple of 8 and columns past the last ray are
 dead (T = -inf). P is the precision of the render, float32 or float64.
 """
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from rtcore.indices import among
 from rtcore.jit import inline, kernel
 from rtcore.lanes import LANES, add_where, any_lane, exceeds, load, select, store, store_where, wide
+from rtcore.memory import carved
 
 # rows of Rays.ray: origin, direction, the open interval (START, T) in which hits count; T becomes the nearest hit
 OX, OY, OZ, DX, DY, DZ, START, T = range(8)
@@ -27,6 +27,9 @@ SMOOTH_ROWS, FLAT_ROWS = U, NX
 #: that the order in which a shadow ray meets transparent things can't change a bit of the picture.
 OPAQUE = 1 << 24
 DEPTH_UNIT = 2.0 ** -16
+
+#: In place of the opacities of all primitives: then `record` keeps the nearest hit.
+CLOSEST = np.zeros(0, np.int32)
 
 
 #: Places in Rays.tally: rays that were sent to a slow exact solver, hits recorded without a proof, and whether (not 0) the answers are not
@@ -50,14 +53,6 @@ def padded(n: int) -> int:
     return -(-n // LANES) * LANES
 
 
-def _carved(*wanted: tuple) -> list[np.ndarray]:
-    """Arrays of these (shape, dtype) with nothing set, from one piece of memory: the system gives large pieces in pages of 2 MiB. Small
-    pages cost 2 to 8 us each when they are touched first, which in a first picture was up to half the time."""
-    sizes = [padded(math.prod(shape) * np.dtype(dtype).itemsize) for shape, dtype in wanted]
-    piece, ends = np.empty(sum(sizes), np.uint8), np.cumsum(sizes)
-    return [piece[end - size:end].view(dtype)[:math.prod(shape)].reshape(shape) for (shape, dtype), size, end in zip(wanted, sizes, ends)]
-
-
 def new_tally() -> np.ndarray:
     """Nothing counted yet."""
     return np.zeros(3, np.int64)
@@ -65,7 +60,7 @@ def new_tally() -> np.ndarray:
 
 def new_rays(n: int, dtype) -> Rays:
     """Rays for `n` rays, with nothing set."""
-    return _cleared(*_carved(*_rays(padded(n), dtype)), new_tally())
+    return _cleared(*carved(*_rays(padded(n), dtype)), new_tally())
 
 
 def _rays(n: int, dtype) -> tuple:
@@ -162,7 +157,7 @@ NO_ANSWER = np.zeros((ANSWER_ROWS, 0), np.float32)      # where there is no ligh
 def new_wave(n: int, dtype, tally: np.ndarray | None = None, smooth: bool = True) -> Wave:
     """A wave for `n` rays, with nothing set; smooth: with room for shading normals that are not the geometric ones."""
     n = padded(n)
-    *rays, surface, light, weight, fade, owner, source = _carved(
+    *rays, surface, light, weight, fade, owner, source = carved(
         *_rays(n, dtype), ((SMOOTH_ROWS if smooth else FLAT_ROWS, n), dtype), ((3, n), np.float32), ((3, n), np.float32),
         ((n,), np.float32), ((n,), np.int32), ((n,), np.int32))
     return Wave(_cleared(*rays, new_tally() if tally is None else tally), surface, light, weight, fade, owner, source)
@@ -171,7 +166,7 @@ def new_wave(n: int, dtype, tally: np.ndarray | None = None, smooth: bool = True
 def new_beam(n: int, lights: int, dtype, tally: np.ndarray | None = None) -> Beam:
     """A beam with room for rays from `n` hits toward so many lights, with nothing set."""
     n, columns = padded(n), padded(n) * lights + LANES
-    *rays, bring, owner, answer = _carved(
+    *rays, bring, owner, answer = carved(
         *_rays(columns, dtype), ((3, columns), np.float32), ((columns,), np.int32), ((ANSWER_ROWS, n), np.float32))
     return Beam(_cleared(*rays, new_tally() if tally is None else tally), bring, owner, answer)
 

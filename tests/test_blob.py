@@ -6,8 +6,7 @@ import rtcore
 from rtcore import Blob, FieldError, Matrix, Node, Scale, Scene, Shear
 from rtcore.flatten import flatten
 from rtcore.reports.oracle import TWINS, crossings, mp, nearest, vector
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
+from rtcore.wave import CLOSEST, DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
 
 ONE = Blob([((0, 0, 0), 1, 1)], 0.6)
 TWO = Blob([((0.75, 0, 0), 1, 1), ((-0.75, 0, 0), 1, 1)], 0.3828125)

@@ -6,8 +6,7 @@ import rtcore
 from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Polygon, Scene, Sphere, Triangle
 from rtcore.bvh import LINK, NODE, build, validate
 from rtcore.flatten import flatten
-from rtcore.stages import CLOSEST
-from rtcore.wave import DEAD, DX, OPAQUE, OX, START, T, new_rays
+from rtcore.wave import CLOSEST, DEAD, DX, OPAQUE, OX, START, T, new_rays
 
 RNG = np.random.default_rng
 

@@ -10,10 +10,9 @@ from rtcore.progressive import Renderer, RenderRequest
 from rtcore.reports.oracle import crossings, mp, nearest
 from rtcore.settings import Settings
 from rtcore.shapes.implicit import line_roots
-from rtcore.stages import CLOSEST
 from rtcore.views.certified import draw
 from rtcore.views.view import Seen
-from rtcore.wave import GX, UNCERTIFIED
+from rtcore.wave import CLOSEST, GX, UNCERTIFIED
 
 from test_leaving import TRANSFORMS, first_hits, rays_of, spawn, trace
 

@@ -177,6 +177,17 @@ def test_samples_are_taken_over_only_where_the_picture_is_the_same(before, after
     renderer.close()
 
 
+def test_a_film_that_notes_lights_goes_on_doing_so():
+    renderer, settings = Renderer(keep=True), Settings(size=SIZE, samples=1)
+    first = picture(renderer, SCENE, SCENE.camera, settings)
+    other = light(SCENE, 0, position=(3, 4, -3))
+    *_, last = renderer.frames(RenderRequest(other, SCENE.camera, settings), coarse=False)      # which would not ask for it
+    assert same(last, anew(other, SCENE.camera, settings)) and not same(last, first)
+    seen, shown = (picture(each, other, SCENE.camera, replace(settings, view="shadow")) for each in (renderer, Renderer(keep=True)))
+    assert same(seen, shown)
+    renderer.close()
+
+
 def test_a_name_is_no_reason_to_begin_anew():
     renderer, settings = Renderer(keep=True), Settings(size=SIZE, samples=8)
     first = picture(renderer, SCENE, SCENE.camera, settings)

@@ -179,8 +179,7 @@ import sys
 import numpy as np
 import rtcore
 from rtcore.flatten import flatten
-from rtcore.stages import CLOSEST
-from rtcore.wave import new_rays
+from rtcore.wave import CLOSEST, new_rays
 shapes = {"sphere": rtcore.Sphere((0, 0, 0), 1), "triangle": rtcore.Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0))}
 for name in sys.argv[1:]:
     name, precision = name.split(".")

@@ -6,8 +6,7 @@ import pytest
 
 from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Scene, Sphere, Triangle
 from rtcore.flatten import flatten
-from rtcore.stages import CLOSEST
-from rtcore.wave import DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
+from rtcore.wave import CLOSEST, DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
 
 RAYS = 100_000
 EPS = {"f64": 2.0 ** -53, "f32": 2.0 ** -24}

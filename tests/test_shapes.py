@@ -16,8 +16,7 @@ from rtcore import (Blob, Box, Cone, Cylinder, Implicit, Matrix, Mesh, Node, Pla
 from rtcore.flatten import flatten
 from rtcore.reports.oracle import crossings, mp, nearest, vector
 from rtcore.shapes import SHAPES
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, OX, START, UNWANTED, T, new_rays
+from rtcore.wave import CLOSEST, DX, OX, START, T, UNWANTED, new_rays
 
 BOUND = 8
 UNIT = {"f64": 2.0 ** -53, "f32": 2.0 ** -24}

@@ -120,6 +120,13 @@ def test_an_error_comes_through():
         refuse_by_address(address, 3)
 
 
+def test_what_was_left_out_can_not_be_called():
+    with pytest.raises(RuntimeError, match="left out"):
+        refuse_by_address(0, 1)
+    with pytest.raises(RuntimeError, match="left out"):
+        fill_by_address(0, np.arange(5, dtype=np.int32), 7)
+
+
 def test_arrays_are_read_as_they_were_written_down():
     like = Outer(np.zeros(0), Inner(np.zeros(0, np.float32), np.zeros((0, 0))), np.zeros(0, np.int32))
     rng, rows = np.random.default_rng(1), rows_for(3, like)

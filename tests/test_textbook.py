@@ -8,8 +8,7 @@ from rtcore.flatten import flatten
 from rtcore.plan import plan
 from rtcore.settings import Settings
 from rtcore.shapes import KINDS
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, OX, START, T, new_rays
+from rtcore.wave import CLOSEST, DX, OX, START, T, new_rays
 
 KIND = [kind for kind in KINDS if kind.textbook is not None]
 DTYPE = {"f64": np.float64, "f32": np.float32}

@@ -6,8 +6,7 @@ import rtcore
 from rtcore import Matrix, Node, Scale, Scene, Shear, Torus
 from rtcore.flatten import flatten
 from rtcore.shapes.kind import SIDES
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
+from rtcore.wave import CLOSEST, DX, ERR, OX, SLOW, START, SURFACE_ROWS, T, new_rays
 
 DTYPES = {"f64": np.float64, "f32": np.float32}
 RING, HORN, SPINDLE, THIN = Torus(1, 0.25), Torus(1, 1), Torus(0.5, 1.25), Torus(1, 1e-6)

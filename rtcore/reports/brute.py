@@ -14,8 +14,7 @@ from rtcore.reports.rows import Row, Worst, example
 from rtcore.scene import Matrix, Node, Scene, Shape
 from rtcore.shapes import Blob, Box, Cone, Cylinder, Implicit, Mesh, Plane, Polygon, Quadric, Sphere, Torus, Triangle
 from rtcore.solvers import RENDERER, names, roots
-from rtcore.stages import CLOSEST
-from rtcore.wave import DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
+from rtcore.wave import CLOSEST, DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
 
 CHUNK = 100_000
 

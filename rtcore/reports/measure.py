@@ -16,8 +16,7 @@ from rtcore.reports.rows import Point, Row, Worst, example
 from rtcore.reports.targets import TARGETS, UNIT
 from rtcore.scene import Shape, invertible
 from rtcore.solvers import METHODS, RENDERER, names, roots
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, OX, START, T, new_rays
+from rtcore.wave import CLOSEST, DX, OX, START, T, new_rays
 
 #: Crossings nearer to the origin than that, in units of its own distance from 0, are at the origin: the oracle has 50 digits.
 AT_ORIGIN = mp.mpf(10) ** -40

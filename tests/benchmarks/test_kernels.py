@@ -16,8 +16,7 @@ from rtcore.framing import framed
 from rtcore.reports.bench.meshes import primary
 from rtcore.scene import Fog
 from rtcore.shapes import KINDS
-from rtcore.stages import CLOSEST
-from rtcore.wave import DX, OX, START, T, new_rays
+from rtcore.wave import CLOSEST, DX, OX, START, T, new_rays
 
 COUNT = 1 << 14
 ROUNDS = 20
