@@ -5,7 +5,7 @@ They show what they are told and emit only what a person does: `tried` while it 
 """
 import math
 
-from PySide6.QtCore import QEvent, Qt, Signal, Slot
+from PySide6.QtCore import Qt, Signal, Slot
 from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import QCheckBox, QColorDialog, QComboBox, QGridLayout, QHBoxLayout, QSizePolicy, QSlider, QToolButton, QWidget
 
@@ -190,10 +190,13 @@ class Swatch(QToolButton):
             painter.setBrush(self.color if self.isEnabled() else self.palette().window())
             painter.drawRoundedRect(self.rect().adjusted(1, 1, -2, -2), 4, 4)
 
-    def event(self, event):
-        if event.type() in (QEvent.Type.Enter, QEvent.Type.Leave):
-            self.update()
-        return super().event(event)
+    def enterEvent(self, event):
+        super().enterEvent(event)
+        self.update()
+
+    def leaveEvent(self, event):
+        super().leaveEvent(event)
+        self.update()
 
 
 def hex_of(color) -> str:

@@ -1,11 +1,12 @@
 """What lies over the picture now and then: a line that says what went wrong, and how far the compiler or a load is."""
-from PySide6.QtCore import QEvent, QObject, QSize, Qt, QTimer, Slot
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Qt, QTimer, Slot
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QVBoxLayout
 
 from app.filing import Filing
 from app.icons import icon
 from app.session import Session
 from app.theme import DARK, Theme
+from app.viewport import Viewport
 
 SHOWN_FOR = 6000        # ms that a mere remark stays; an error stays until it is dismissed or the next message
 
@@ -13,7 +14,7 @@ SHOWN_FOR = 6000        # ms that a mere remark stays; an error stays until it i
 class Notice(QFrame):
     """A bar at the top of the picture: one line, dismissible, in nobody's way."""
 
-    def __init__(self, session: Session, parent: QWidget):
+    def __init__(self, session: Session, parent: Viewport):
         super().__init__(parent)
         self.setObjectName("notice")
         self._theme: Theme = DARK
@@ -34,7 +35,7 @@ class Notice(QFrame):
         self._timer = QTimer(self, singleShot=True, interval=SHOWN_FOR)
         self._timer.timeout.connect(self.hide)
         self.hide()
-        parent.installEventFilter(self)
+        parent.resized.connect(self._place)
         session.said.connect(self.say)
         session.document.replaced.connect(self.hide)    # what was said of another file is over
 
@@ -62,12 +63,10 @@ class Notice(QFrame):
         self._place()
         self._timer.stop() if level == "error" else self._timer.start()
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self._place()
-        return False
-
+    @Slot()
     def _place(self):
+        if self.isHidden():
+            return
         room = self.parentWidget().width() - 24
         wanted = self.label.fontMetrics().horizontalAdvance(self.label.text()) + 110
         width = min(max(wanted, 280), room)
@@ -77,7 +76,7 @@ class Notice(QFrame):
 class Busy(QFrame):
     """A small card at the foot of the picture while kernels compile or a file is read."""
 
-    def __init__(self, session: Session, filing: Filing, parent: QWidget):
+    def __init__(self, session: Session, filing: Filing, parent: Viewport):
         super().__init__(parent)
         self.setObjectName("busy")
         self._session, self._filing = session, filing
@@ -92,7 +91,7 @@ class Busy(QFrame):
         self._patience = QTimer(self, singleShot=True, interval=250)     # what is quick is not announced
         self._patience.timeout.connect(self._show_loading)
         self.hide()
-        parent.installEventFilter(self)
+        parent.resized.connect(self._place)
         session.compiling_changed.connect(self.refresh)
         filing.loading_changed.connect(self.refresh)
 
@@ -121,11 +120,6 @@ class Busy(QFrame):
         self.show()
         self.raise_()
         self._place()
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() == QEvent.Type.Resize:
-            self._place()
-        return False
 
     def _place(self):
         room, height = self.parentWidget().width(), self.sizeHint().height()

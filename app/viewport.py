@@ -2,7 +2,7 @@
 import itertools
 import math
 
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, QTimer, Signal, Slot
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, QTimer, Signal, Slot
 from PySide6.QtGui import QColor, QGuiApplication, QImage, QPainter, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
@@ -22,6 +22,7 @@ class Viewport(QWidget):
     """One QImage over the worker's newest buffer, drawn pixel for pixel: 0.5 ms at 1920 x 1080."""
 
     asking_changed = Signal()
+    resized = Signal()
 
     def __init__(self, session: Session, parent: QWidget | None = None):
         super().__init__(parent)
@@ -29,6 +30,7 @@ class Viewport(QWidget):
         self._theme: Theme = DARK
         self._image: QImage | None = None
         self._outline: tuple[QImage, QPointF] | None = None
+        self._ratio = 0.0
         self._bytes: list = []              # what the images borrow their pixels from
         self._press: tuple[QPointF, Qt.MouseButton] | None = None
         self._last = QPointF()
@@ -86,6 +88,8 @@ class Viewport(QWidget):
         return QRectF((self.width() - width) / 2, 0, width, self.height())
 
     def paintEvent(self, event):
+        if self.devicePixelRatioF() != self._ratio:     # on another screen now. The event that tells so comes among all others: to look
+            self._tell_size()                           # at each of them took twice as many waits for Python's lock as painting does
         with QPainter(self) as painter:
             self._paint(painter)
 
@@ -117,14 +121,10 @@ class Viewport(QWidget):
     def resizeEvent(self, event):
         super().resizeEvent(event)
         self._tell_size()
-
-    def event(self, event):
-        if event.type() == QEvent.Type.DevicePixelRatioChange:
-            self._tell_size()
-        return super().event(event)
+        self.resized.emit()
 
     def _tell_size(self):
-        ratio = self.devicePixelRatioF()
+        self._ratio = ratio = self.devicePixelRatioF()
         self._session.resize((round(self.width() * ratio), round(self.height() * ratio)), ratio)
 
     # the region of interest

@@ -2,7 +2,8 @@
 import math
 
 import pytest
-from PySide6.QtCore import QEvent, QObject
+from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtWidgets import QLabel
 
 from app.forecast import Forecast, left_text
 from app.options import Options
@@ -50,6 +51,21 @@ def test_a_text_moves_nothing_in_the_window(window, session, settled, qtbot):
             assert part.text() == part.accessibleDescription() == text
         qtbot.wait(20)
     assert layouts.count == 0 and {name: part.geometry() for name, part in bar.parts.items()} == places
+
+
+def test_what_has_no_room_is_shortened_and_comes_back(window, session, qtbot):
+    window.resize(1300, 700)
+    qtbot.wait(20)
+    figure = window.statusBar().under
+    name = "a sphere with quite a long name, " * 20
+    figure.setText(name)
+    shown = QLabel.text(figure)
+    assert figure.text() == name and shown.endswith("\u2026") and len(shown) < len(name)
+    assert figure.fontMetrics().horizontalAdvance(shown) <= figure.contentsRect().width()
+    window.resize(window.width() + 200, window.height())
+    qtbot.waitUntil(lambda: len(QLabel.text(figure)) > len(shown))
+    figure.setText("<b>a & b</b>")
+    assert QLabel.text(figure) == "<b>a & b</b>" and figure.textFormat() == Qt.TextFormat.PlainText
 
 
 def test_texts():
