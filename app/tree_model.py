@@ -1,7 +1,9 @@
 """The scene as an item model: rows are made when they are first looked at, so a scene of many thousand nodes opens at once."""
+from typing import NamedTuple
+
 import msgspec
 from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, Qt
-from PySide6.QtGui import QColor, QIcon
+from PySide6.QtGui import QColor
 
 from app.icons import icon
 from app.places import Place, below, definition_around, kind_of, label_of, lights_of, record_at
@@ -22,11 +24,22 @@ TIPS = {"scene": "What the scene consists of", "lights": "What lights the scene"
 class Row:
     """A row that has been looked at: a place, or one of the branches. Its children come into being one by one."""
 
-    __slots__ = ("parent", "number", "place", "record", "children")
+    __slots__ = ("parent", "number", "place", "record", "children", "depth")
 
     def __init__(self, parent: "Row | None", number: int, place: Place, record: object):
         self.parent, self.number, self.place, self.record = parent, number, place, record
+        self.depth: int = parent.depth + 1 if parent is not None else 0
         self.children: dict[int, Row] = {}
+
+
+class Look(NamedTuple):
+    """All that is seen of a row; `checked` is None where there is no box, `depth` 1 on the first level."""
+
+    text: str
+    icon: str
+    checked: bool | None
+    faint: bool
+    depth: int
 
 
 class SceneModel(QAbstractItemModel):
@@ -83,15 +96,19 @@ class SceneModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.EditRole:
             return getattr(row.record, "name", "")
         if role == Qt.ItemDataRole.DecorationRole:
-            return self._icon(row)
-        if role == Qt.ItemDataRole.CheckStateRole and row.place.kind in ("node", "light"):
-            on = row.record.visible if row.place.kind == "node" else row.record.on
+            return icon(self._icon(row), self._theme, switch=False)
+        if role == Qt.ItemDataRole.CheckStateRole and (on := self._checked(row)) is not None:
             return Qt.CheckState.Checked if on else Qt.CheckState.Unchecked
         if role == Qt.ItemDataRole.ForegroundRole and self._hidden(row):
             return QColor(self._theme.faint)
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleDescriptionRole):
             return self._tip(row)
         return None
+
+    def look(self, index: QModelIndex) -> Look:
+        """All at once of what `data` tells part by part."""
+        row = index.internalPointer()
+        return Look(self._text(row), self._icon(row), self._checked(row), self._hidden(row), row.depth)
 
     def setData(self, index: QModelIndex, value, role: int = Qt.ItemDataRole.EditRole) -> bool:
         row = self._row(index)
@@ -224,11 +241,14 @@ class SceneModel(QAbstractItemModel):
             text += f"  ({len(row.record.children):,})"
         return text
 
-    def _icon(self, row: Row) -> QIcon:
+    def _icon(self, row: Row) -> str:
         kind = row.place.kind
-        name = kind_of(row.record) if kind == "node" else type(row.record).__name__.lower() if kind == "light" else \
-            {"materials": "material", "scene": "scene"}.get(kind, kind)
-        return icon(name, self._theme, switch=False)
+        return kind_of(row.record) if kind == "node" else type(row.record).__name__.lower() if kind == "light" else \
+            "material" if kind == "materials" else kind
+
+    def _checked(self, row: Row) -> bool | None:
+        kind = row.place.kind
+        return row.record.visible if kind == "node" else row.record.on if kind == "light" else None
 
     def _hidden(self, row: Row) -> bool:
         while row is not None:

@@ -1,7 +1,8 @@
 """The scene tree: what there is, what is shown, what is selected."""
 from PySide6.QtCore import QItemSelectionModel, QModelIndex, QSize, Slot
-from PySide6.QtWidgets import QAbstractItemView, QTreeView, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QVBoxLayout, QWidget
 
+from app.panels.rows import SceneView
 from app.places import record_at
 from app.session import Session
 from app.theme import Theme
@@ -17,13 +18,8 @@ class TreePanel(QWidget):
         super().__init__(parent)
         self.session = session
         self.model = SceneModel(session, self)
-        self.view = QTreeView(self)
-        self.view.setModel(self.model)
+        self.view = SceneView(self.model, self)
         self.view.setAccessibleName("Scene tree")
-        self.view.setHeaderHidden(True)
-        self.view.setUniformRowHeights(True)
-        self.view.setIconSize(QSize(16, 16))
-        self.view.setIndentation(16)
         self.view.setEditTriggers(QAbstractItemView.EditTrigger.DoubleClicked | QAbstractItemView.EditTrigger.EditKeyPressed)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -36,6 +32,7 @@ class TreePanel(QWidget):
 
     def dress(self, theme: Theme):
         self.model.dress(theme)
+        self.view.dress(theme)
 
     def sizeHint(self) -> QSize:
         return QSize(230, 400)
