@@ -38,8 +38,8 @@ LIGHT = Theme("light", window="#e9ebee", panel="#f6f7f9", field="#ffffff", raise
               error="#c3271b", error_soft="#fdeae8", stage="#d5d9de")
 CHOICES = ("system", "light", "dark")
 
+POINTS = 9.5        # of all texts that are not headings or the like
 SHEET = """
-QWidget { font-size: 9.5pt; }
 QMainWindow, QDialog { background: %(window)s; }
 QMainWindow::separator { background: %(window)s; width: 5px; height: 5px; }
 QMainWindow::separator:hover { background: %(accent)s; }
@@ -72,13 +72,11 @@ QDockWidget::close-button, QDockWidget::float-button { border: none; border-radi
 QDockWidget::close-button { right: 6px; }
 QDockWidget::float-button { right: 26px; }
 QDockWidget::close-button:hover, QDockWidget::float-button:hover { background: %(hover)s; }
-QDockWidget > QWidget { background: %(panel)s; }
 QTabBar { background: %(window)s; }
 QTabBar::tab { background: transparent; color: %(muted)s; padding: 6px 11px; border: none; border-bottom: 2px solid transparent; }
 QTabBar::tab:hover { color: %(text)s; }
 QTabBar::tab:selected { color: %(text)s; border-bottom: 2px solid %(accent)s; }
 
-QScrollArea, QScrollArea > QWidget > QWidget { background: %(panel)s; border: none; }
 QScrollBar:vertical { background: transparent; width: 10px; margin: 1px; }
 QScrollBar:horizontal { background: transparent; height: 10px; margin: 1px; }
 QScrollBar::handle { background: %(line)s; border-radius: 4px; min-height: 28px; min-width: 28px; }
@@ -138,7 +136,7 @@ QSlider::handle:horizontal:hover, QSlider::handle:horizontal:focus { border: 2px
 
 QStatusBar { background: %(window)s; color: %(muted)s; }
 QStatusBar::item { border: none; }
-QStatusBar QWidget { color: %(muted)s; }
+Figure { color: %(muted)s; }
 
 QLabel[role="label"] { color: %(muted)s; }
 QLabel[role="hint"] { color: %(muted)s; }
@@ -179,6 +177,13 @@ def palette(theme: Theme) -> QPalette:
     for role in (roles.WindowText, roles.Text, roles.ButtonText):
         result.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.faint))
     return result
+
+
+def set_size(app: QApplication):
+    """Texts of our size, in all widgets that are made from now on."""
+    font = app.font()
+    font.setPointSizeF(POINTS)
+    app.setFont(font)
 
 
 def apply(app: QApplication, theme: Theme):

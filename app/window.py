@@ -31,6 +31,7 @@ class Window(QMainWindow):
     """Puts things together and holds no state of its own: the session has it all."""
 
     def __init__(self, session: Session, preferences: Preferences):
+        theme.set_size(QApplication.instance())
         super().__init__()
         self.session, self.preferences = session, preferences
         self.filing = Filing(session)
