@@ -245,8 +245,8 @@ class Session(QObject):
         if place != self.selection:
             self.selection = place
             self._tell_outline()
-            self._redraw_outline()
             self.selection_changed.emit()
+            self._redraw_outline()      # last: its thread would have the panels wait for Python's lock
 
     def place_under(self, x: float, y: float) -> Under | None:
         """What is at (x, y), given in 0 .. 1 of the picture's width and height."""

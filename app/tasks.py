@@ -1,4 +1,5 @@
 """Work off the window's thread that is not rendering: files read and written, outlines, bounds."""
+import queue
 import sys
 import threading
 import time
@@ -17,7 +18,9 @@ class Outcome(NamedTuple):
 
 
 class Tasks(QObject):
-    """A short-lived thread a task. `done` or `failed` is called on the window's thread; an exception is never lost."""
+    """A thread for each task that runs, of which one stays for the next: Python waits until a new one runs, 0.6 to 5 ms where the render
+    thread has its lock, and the window stands still meanwhile. `done` or `failed` is called on the window's thread; an exception is never
+    lost."""
 
     _ended = Signal(object)
     crashed = Signal(str)       # a task that nobody handles the failure of: one line
@@ -25,6 +28,9 @@ class Tasks(QObject):
     def __init__(self, parent: QObject | None = None):
         super().__init__(parent)
         self._threads: set[threading.Thread] = set()
+        self._jobs: queue.SimpleQueue[tuple[Callable[[], None], str] | None] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._idle = False          # a thread waits for a job
         self._closed = False
         self._ended.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
 
@@ -43,10 +49,27 @@ class Tasks(QObject):
             if not self._closed:
                 self._ended.emit(outcome)
 
-        self._threads = {thread for thread in self._threads if thread.is_alive()}
-        thread = threading.Thread(target=body, name=name, daemon=True)
-        self._threads.add(thread)
-        thread.start()
+        with self._lock:
+            idle, self._idle = self._idle, False
+        self._jobs.put((body, name))
+        if not idle:
+            self._threads = {thread for thread in self._threads if thread.is_alive()}
+            thread = threading.Thread(target=self._serve, daemon=True)
+            self._threads.add(thread)
+            thread.start()
+
+    def _serve(self):
+        """What a thread does: a task, and the next one, unless another thread waits for that already."""
+        me = threading.current_thread()
+        while (job := self._jobs.get()) is not None:
+            body, me.name = job
+            body()
+            body = job = None       # what it holds may be large
+            me.name = "task"
+            with self._lock:
+                if self._idle or self._closed:
+                    return
+                self._idle = True
 
     @Slot(object)
     def _deliver(self, outcome: Outcome):
@@ -55,7 +78,11 @@ class Tasks(QObject):
 
     def close(self):
         """Wait for the threads, together at most a second; what is not done by then ends with the process."""
-        self._closed = True
+        with self._lock:
+            self._closed = True
+            idle, self._idle = self._idle, False
+        if idle:
+            self._jobs.put(None)
         deadline = time.monotonic() + 1.0
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
