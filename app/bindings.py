@@ -14,6 +14,12 @@ from rtcore.fields import FieldError
 _numbers = itertools.count()
 
 
+def same(a: object, b: object) -> bool:
+    """Whether two values of a field surely look alike. A record that is made anew has its vectors anew; long lists are not compared."""
+    return a is b or (type(a) is type(b) and isinstance(a, (bool, int, float, str, tuple)) and
+                      not (isinstance(a, tuple) and len(a) > 16) and a == b)
+
+
 class Binding(QObject):
     """Ties `editor` to a value of a model.
 
@@ -29,18 +35,21 @@ class Binding(QObject):
         self._editor, self._read, self._make, self._commit, self._seal = editor, read, make, commit, seal
         self._merge = ("binding", next(_numbers))
         self._speaking = False
+        self._shown: object = self              # the value that the editor shows for sure; the binding itself: none
         editor.tried.connect(self._try)
         editor.edited.connect(self._edit)
         editor.released.connect(self._release)
         self.refresh()
 
     def refresh(self):
-        """Show the model's value, unless this very editor is setting it."""
-        if not self._speaking:
-            self._editor.show_value(self._read())
+        """Show the model's value, unless this very editor is setting it, or shows just that: of a node's 25 editors an edit changes one."""
+        if not self._speaking and not same(value := self._read(), self._shown):
+            self._editor.show_value(value)
+            self._shown = value
 
     @Slot(object)
     def _try(self, value: object):
+        self._shown = self
         try:
             self._make(value)
         except FieldError as error:
@@ -50,7 +59,7 @@ class Binding(QObject):
 
     @Slot(object, bool)
     def _edit(self, value: object, dragging: bool):
-        self._speaking = True
+        self._speaking, self._shown = True, self
         try:
             self._commit(self._make(value), self._merge if dragging else None)
         except FieldError as error:
@@ -63,4 +72,5 @@ class Binding(QObject):
 
     @Slot()
     def _release(self):
+        self._shown = self
         self._seal()

@@ -46,6 +46,21 @@ def test_a_degenerate_camera_can_not_be_entered(window, session, camera_form, qt
     assert entry.text() == was and not entry.property("refused")
 
 
+def test_only_what_changed_is_shown_anew(window, session, qtbot, monkeypatch):
+    shown, form = [], window.panels["Fog"].form
+    for name, editor in form.editors.items():
+        monkeypatch.setattr(editor, "show_value", lambda value, name=name, show=editor.show_value: shown.append(name) or show(value))
+    session.edit(msgspec.structs.replace(session.scene, fog=msgspec.structs.replace(session.scene.fog, density=0.5)), "thicker")
+    assert shown == ["density"]
+    entry = form.editors["density"].entries[0]
+    type_into(qtbot, entry, "-10")      # refused: the model stays as it is, the editor does not
+    shown.clear()
+    form.refresh()
+    assert shown == ["density"] and entry.property("refused")
+    entry.clearFocus()
+    assert entry.text() == "0.5" and not entry.property("refused")
+
+
 def test_a_refused_text_goes_when_the_focus_goes(window, session, camera_form, qtbot):
     entry = camera_form.editors["fov"].entries[0]
     type_into(qtbot, entry, "200", end=None)
