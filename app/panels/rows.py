@@ -5,7 +5,7 @@ from PySide6.QtCore import QRect, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QCursor, QIcon, QPainter, QPixmap
 from PySide6.QtWidgets import QStyle, QStyleOptionViewItem, QTreeView, QWidget
 
-from app.icons import icon
+from app.icons import render
 from app.theme import DARK, Theme
 from app.tree_model import SceneModel
 
@@ -139,5 +139,6 @@ class SceneView(QTreeView):
     def _icon(self, name: str) -> QPixmap:
         key = "icon", name
         if key not in self._pictures:
-            self._pictures[key] = icon(name, self._theme, switch=False).pixmap(QSize(ICON, ICON), self._ratio)
+            self._pictures[key] = pixmap = render(name, self._theme.icon, round(ICON * self._ratio))
+            pixmap.setDevicePixelRatio(self._ratio)
         return self._pictures[key]
