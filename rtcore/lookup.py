@@ -19,7 +19,7 @@ OTHER, SAME, PART = range(3)        # what a wave is to the kept one
 
 
 class Kept(NamedTuple):
-    """What is known of a tile's waves, the first `whole` of which all is known; d waves, l lights, k kinds of shapes."""
+    """The first waves of a tile, of which all is known: at most d of them; l lights, k kinds of shapes."""
 
     met: np.ndarray         # int64 (d, words): levels.Met
     shades: np.ndarray      # int64 (d l, words): how far each light reaches the hits, as `State.reaches`

@@ -6,6 +6,7 @@ coarse passes. How fine the first lattice is depends on how soon it has to be se
 """
 import os
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
@@ -106,7 +107,7 @@ class Renderer:
         if self._pool is None or self._threads != threads:
             if self._pool is not None:
                 self._pool.shutdown(cancel_futures=True)
-            self._pool, self._threads = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threads
+            self._pool, self._threads = _started(threads), threads
         render = self._render
         if render is not None and render.answers(request, self._keep):
             render.look(request, loaded)
@@ -220,6 +221,20 @@ class Renderer:
                 "peak_memory_mib": peak_memory_mib(), "nonfinite_pixels": int(render.counts()[NONFINITE]),
                 "stages": list(render.plan.stages), "left_out": [{"stage": stage, "why": why} for stage, why in left_out],
                 "error": {"rmse_estimate": render.error()}, "converged": render.converged}
+
+
+def _started(threads: int) -> ThreadPoolExecutor:
+    """A pool of which all threads run already: the second one would start some milliseconds late, while the first is at work."""
+    pool, all_there = ThreadPoolExecutor(threads, thread_name_prefix="rayscope-trace"), threading.Barrier(threads + 1)
+    try:
+        for _ in range(threads):
+            pool.submit(all_there.wait)
+        all_there.wait()
+    except BaseException:       # no more threads to be had, or interrupted: those that wait are not to do so for ever
+        all_there.abort()
+        pool.shutdown(wait=False)
+        raise
+    return pool
 
 
 def cores() -> int:
