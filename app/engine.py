@@ -47,10 +47,10 @@ class Job(NamedTuple):
 class Engine:
     """rtcore's renderer behind the few calls the worker needs. Importing it takes a second: numba comes with it."""
 
-    def __init__(self):
+    def __init__(self, give_way: Callable[[], None] | None = None):
         from rtcore import film, progressive, warm
         self._film, self._progressive, self._warm = film, progressive, warm
-        self._renderer = progressive.Renderer(keep=True)
+        self._renderer = progressive.Renderer(keep=True, give_way=give_way)
         self._encoders = ThreadPoolExecutor(2, thread_name_prefix="rayscope-encode")     # 4 to 6 ms of one thread at 1280 x 720
         self._warmed: tuple[Scene, Options, bool] | None = None
 

@@ -11,6 +11,7 @@ import numpy as np
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from app.compiling import Compiler, Compiling
+from app.courtesy import Courtesy
 from app.engine import Engine, Job
 from app.outline import Outline, trace_outline
 
@@ -38,10 +39,12 @@ class Worker(QObject):
     failed = Signal(str)        # one line; the whole story is on stderr
     _submitted = Signal()       # comes round when its thread is done with what it is at
 
-    def __init__(self, renderer_factory: Callable[[], Engine] = Engine, compiler: Compiler | None = None, parent: QObject | None = None):
+    def __init__(self, renderer_factory: Callable[[], Engine] | None = None, compiler: Compiler | None = None,
+                 parent: QObject | None = None):
         super().__init__(parent)
         self.compiling: Compiling | None = None
-        self._factory = renderer_factory
+        self._courtesy = Courtesy()
+        self._factory = renderer_factory or (lambda: Engine(self._courtesy.give_way))
         self._compiler = compiler or Compiler()
         self._wake = threading.Condition()
         self._next: Job | None = None
@@ -107,6 +110,7 @@ class Worker(QObject):
             self._wake.notify()
         self._compiler.kill()
         self._thread.join(1.0)
+        self._courtesy.close()
 
     # the render thread
 

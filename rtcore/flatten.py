@@ -2,7 +2,7 @@
 
 Primitives are numbered through all kinds, kinds by name and, within one, in the order of its tree's leaves.
 """
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +44,10 @@ class Geometry(NamedTuple):
     nbytes: int
 
 
-def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = None) -> Geometry:
+def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = None,
+            give_way: Callable[[], None] | None = None) -> Geometry:
     """Arrays and trees for the visible shapes of a scene; kinds of which nothing has changed are taken over from `previous`.
+    give_way: called before each shape is packed.
 
     Raises FieldError where a placed shape's numbers are not finite or its transforms together can't be inverted.
     """
@@ -65,7 +67,12 @@ def flatten(scene: Scene, precision: str = "f64", previous: Geometry | None = No
         if group is None or not _same(group.key, key):
             known = {} if group is None else {index: group.packs[index] for index, *same in group.key
                                               if index in group.packs and index < len(leaves) and _is(same, leaves[index])}
-            group = _gather(kind, key, [(index, known.get(index) or packed(leaves[index], dtype)) for index in kinds[kind]], leaves, dtype)
+            packs = []
+            for index in kinds[kind]:
+                if give_way is not None and index not in known:
+                    give_way()
+                packs.append((index, known.get(index) or packed(leaves[index], dtype)))
+            group = _gather(kind, key, packs, leaves, dtype)
         if len(group.owner):        # all of it may be degenerate
             groups.append(group._replace(first=first))
         owners.append(group.owner)

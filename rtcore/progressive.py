@@ -40,10 +40,11 @@ MARGIN = 1e-5       # by which boxes are made larger, of their corners' coordina
 class Renderer:
     """Renders one request after another, keeping from one to the next what has not changed: arrays of the scene, threads and their arrays;
     with `keep` also what first samples have met (`rtcore.keep`), as far as the edit leaves it (`rtcore.edits`), and finished samples.
-    Not for two threads at once."""
+    Not for two threads at once. give_way: called now and then while shapes are packed, which is Python's work and takes long where there
+    are many; it may wait a little for another thread."""
 
-    def __init__(self, keep: bool = False):
-        self._keep = keep
+    def __init__(self, keep: bool = False, give_way: Callable[[], None] | None = None):
+        self._keep, self._give_way = keep, give_way
         self._geometry: Geometry | None = None
         self._scene: Scene | None = None
         self._pool: ThreadPoolExecutor | None = None
@@ -80,7 +81,7 @@ class Renderer:
         """The scene's arrays, rebuilt only as far as it differs from the last one's."""
         old = self._geometry
         if old is None or self._scene is not scene or old.dtype != DTYPES[precision]:
-            self._geometry, self._scene = flatten(scene, precision, old), scene
+            self._geometry, self._scene = flatten(scene, precision, old, self._give_way), scene
         return self._geometry
 
     def frames(self, request: RenderRequest, cancelled: Callable[[], bool] = lambda: False, coarse: bool = True,
