@@ -17,7 +17,6 @@ from rtcore.flatten import Geometry, nbytes
 from rtcore.keep import Memory
 from rtcore.latest import Latest
 from rtcore.leaves import Leaf
-from rtcore.memory import carved
 from rtcore.pace import Pace
 from rtcore.plan import VIEW, Plan
 from rtcore.recast import Recast
@@ -332,7 +331,9 @@ class Render:
     def frame(self, done: bool) -> Frame:
         """The picture as it is now."""
         began, film, (width, height) = time.perf_counter(), self.film, self.settings.size
-        pixels, node, distance = carved(((height, width, 3), np.float32), ((height, width), np.int32), ((height, width), np.float32))
+        # not from `memory.carved`: frames come and go, and what the last ones left is there without being cleared
+        pixels = np.empty((height, width, 3), np.float32)
+        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
         bands = [0, height]
         if not self.tracing:    # else the pool's threads have their hands full
             bands = np.linspace(0, height, len(self.scratches) + 1).astype(int).tolist()
