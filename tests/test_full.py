@@ -26,7 +26,7 @@ def full_plan(scene, settings, camera=None):
     return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True, gloss=True)
 
 
-def full_geometry(scene, precision="f64", previous=None) -> Geometry:
+def full_geometry(scene, precision="f64", previous=None, give_way=None) -> Geometry:
     """Every kind of shape, those that the scene does not have far from where any ray goes, or with an empty table if they have no end;
     flat meshes with rows for normals."""
     geometry = flatten(scene, precision)
