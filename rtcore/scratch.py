@@ -10,8 +10,6 @@ from rtcore.lookup import no_kept, with_room
 from rtcore.stages import COUNTS, NUMBERS, Program, State
 from rtcore.wave import COUNTED, Beam, Wave, new_beam, new_tally, new_wave, padded
 
-SPARE = 2       # times the room that is needed: to ask for more goes through Python; what is not touched costs nothing
-
 
 class Scratch:
     """The arrays, what is counted, where the time goes."""
@@ -65,7 +63,7 @@ class Scratch:
         yet costs 2 us a page, which for a first picture was half its time."""
         which = level % len(self.waves)
         if self.waves[which].owner.shape[0] < n:
-            self.waves[which] = new_wave(n * SPARE, self.dtype, self.tally, self.smooth)
+            self.waves[which] = new_wave(n * 5 // 4, self.dtype, self.tally, self.smooth)
             self._replaced = True
         return self.waves[which]
 
@@ -74,7 +72,7 @@ class Scratch:
         while len(self.paths) <= level:
             self.paths.append(np.ones(0, np.int32))
         if len(self.paths[level]) < n:
-            self.paths[level] = np.ones(n * SPARE, np.int32)
+            self.paths[level] = np.ones(n * 5 // 4, np.int32)
         return self.paths[level]
 
     def _most(self) -> int:
@@ -99,7 +97,7 @@ class Scratch:
     def beams(self, n: int, lights: int) -> Beam:
         """A beam with room for shadow rays from n hits toward so many lights."""
         if self.beam.answer.shape[1] < n or self.beam.owner.shape[0] < padded(n) * lights + LANES:
-            self.beam, self._replaced = new_beam(n * SPARE, lights, self.dtype, self.tally), True
+            self.beam, self._replaced = new_beam(n * 5 // 4, lights, self.dtype, self.tally), True
         return self.beam
 
     @property
