@@ -65,11 +65,10 @@ class Tasks(QObject):
             body, me.name = job
             body()
             body = job = None       # what it holds may be large
-            me.name = "task"
             with self._lock:
                 if self._idle or self._closed:
                     return
-                self._idle = True
+                self._idle, me.name = True, "task"
 
     @Slot(object)
     def _deliver(self, outcome: Outcome):

@@ -140,12 +140,11 @@ def test_arrays_are_read_as_they_were_written_down():
 
 
 def test_the_clock_goes_forward_at_the_pace_of_pythons():
-    before, (first, then), after = time.monotonic(), two_readings(), time.monotonic()
+    first, then = two_readings()
     assert then >= first
     start, clock = two_readings()[0], time.perf_counter()
     time.sleep(0.05)
     assert (two_readings()[0] - start) * TICK == pytest.approx(time.perf_counter() - clock, rel=0.2)
-    assert after >= before
 
 
 def test_a_clock_adds_up_what_kernels_and_python_have_measured():
