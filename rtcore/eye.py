@@ -93,14 +93,16 @@ def cast(wave, target, view, tile, sample, seed):
 
 
 @kernel
-def cast_list(wave, target, view, width, pixels, seed):
-    """Fill the wave with rays for a list of pixels and return their number; view and `target` as for `cast`. pixels (m, 3): a pixel's
-    number, its first sample and the one after its last. A pixel's samples follow one another, so that a packet is a narrow bundle."""
+def cast_list(wave, target, number, view, width, pixels, seed):
+    """Fill the wave with rays for a list of pixels and return how many; view and `target` as for `cast`, number (n): which of its pixel's
+    samples each is. pixels (m, 3): a pixel's number, its first sample and the one after its last. A pixel's samples follow one another, so
+    that a packet is a narrow bundle."""
     n, places = 0, _new_places()
     for i in range(len(pixels)):
         pixel, x, y = pixels[i, 0], pixels[i, 0] % width, pixels[i, 0] // width
         for sample in range(pixels[i, 1], pixels[i, 2]):
             u, v = jitter(pixel, sample, seed)
+            number[n] = sample
             _put(wave, n, target, places, pixel, u + x, v + y)
             n += 1
             if n & 7 == 0:

@@ -5,7 +5,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import NamedTuple
 
 import msgspec
@@ -25,12 +25,13 @@ from rtcore.schedule import COARSEST, FURTHER, TILE, Pass, further, passes, tile
 from rtcore.settings import Settings
 from rtcore.scratch import Scratch
 from rtcore.stages import COUNTS, PRIMARY, REFLECTION, REFRACTION, SHADOW
+from rtcore.todo import FINISHED, new_todo
 from rtcore.trace import Tracer
 from rtcore.views.view import Seen
 from rtcore.wave import UNWANTED
 
 PARTIAL = 0.25      # seconds after which a long pass shows what it has
-LOOK = 0.005        # seconds between two looks whether a pass is still wanted
+LOOK = 0.002        # seconds between two looks whether a pass is still wanted
 SHOWN = 2.0         # how much longer it takes until a frame is on the screen than until it is made
 
 
@@ -133,8 +134,7 @@ class Render:
         self.number = 0         # of the pass
         self.samples = 0        # per pixel, complete
         self.elapsed = 0.0
-        self.done_tiles = itertools.count(1)
-        self.progress = 0.0
+        self._todo, self._weight = new_todo(np.zeros((0, 8), np.int64)), 0.0    # of the pass; how much it is, in samples of every pixel
 
     def answers(self, request: RenderRequest, keep: bool) -> bool:
         """Whether what is under way is what another request wants too, at most seen differently. The very same request is answered by
@@ -177,13 +177,10 @@ class Render:
                 self.edges.setdefault(spacing, TILE if self.memory is None else self.pace.edge(spacing, size, len(self.scratches)))
         else:       # a tile's sample is there if its first pixel's is: so tiles may become smaller, parts of those before, never larger
             self.edges[FURTHER] = min(self.edges.get(FURTHER, self.edges[1]), TILE)
-        queue = tiles(one, *size, self.edges)
-        share = weight(one, *size)
-        each = share / max(len(queue), 1)
-        todo, halt = iter(queue), threading.Event()
+        self._todo, self._weight = new_todo(tiles(one, *size, self.edges), one.pixels), weight(one, *size)
+        halt, ended = threading.Event(), threading.Semaphore(0)
         # time runs out only once every pixel has a sample
         deadline = self.prepared + (self.settings.seconds or np.inf) if self.samples else np.inf
-        self.done_tiles = itertools.count(1)
         began, before = time.perf_counter(), self.counts()
         shown, patience = began, PARTIAL if self.number else self.soon
 
@@ -195,11 +192,17 @@ class Render:
             self._want(False)
 
         self.tracing, self._squared = True, None
-        self._want(True)
-        shares = [self.pool.submit(self._work, scratch, one, todo, each, stale) for scratch in self.scratches]
+        self._want(not stale())     # the first look comes too late for what is soon over
+        shares = [self.pool.submit(self.tracer.trace, scratch, self.film, self._todo, one.samples, stale, self.memory)
+                  for scratch in self.scratches]
+        for share in shares:
+            share.add_done_callback(lambda _: ended.release())
+        running = len(shares)
         try:
-            while wait(shares, LOOK, FIRST_EXCEPTION).not_done and not any(share.done() and share.exception() for share in shares):
-                if stale():
+            while running and not any(share.done() and share.exception() for share in shares):
+                if ended.acquire(timeout=LOOK):
+                    running -= 1
+                elif stale():
                     end()
                 elif (now := time.perf_counter()) - shown >= patience:
                     self.elapsed, shown, patience = now - self.prepared, now, PARTIAL
@@ -213,7 +216,7 @@ class Render:
         results = [share.result() for share in shares]      # an exception of a thread comes out here
         self.finished = all(results)
         if one.samples == range(1):
-            pixels = (share if self.finished else (next(self.done_tiles) - 1) * each) * size[0] * size[1]
+            pixels = self._traced() * size[0] * size[1]
             if self.fresh or self.film.count.max() <= 1:    # else the samples were there, and tiles were skipped
                 self._note_pace(one.spacing, pixels, (time.perf_counter() - began) * len(shares), self.counts() - before)
         self.spent = float(self.film.count.mean())
@@ -232,16 +235,14 @@ class Render:
         elif not counts[[PRIMARY, SHADOW, REFLECTION, REFRACTION]].any():
             self.pace.note_known(pixels, seconds)
 
-    def _work(self, scratch: Scratch, one: Pass, todo: Iterator, each: float, stale: Callable[[], bool]) -> bool:
-        """One thread's share of a pass: the next tile as long as there is one; False if it became stale."""
-        for tile in todo:
-            if one.pixels is not None and (stale() or not self.tracer.listed(scratch, self.film, tile, stale)):
-                return False
-            for sample in one.samples:
-                if stale() or not self.tracer.tile(scratch, self.film, tile, sample, stale, self.memory):
-                    return False
-            self.progress = min((self.spent + next(self.done_tiles) * each) / self.plan.samples, 1.0)
-        return True
+    def _traced(self) -> float:
+        """How much of the pass under way is done, in samples of every pixel."""
+        return self._weight * int(self._todo.counters[FINISHED]) / max(len(self._todo.tiles), 1)
+
+    @property
+    def progress(self) -> float:
+        """How far the picture is, 0 .. 1; any thread may ask."""
+        return 1.0 if self.done else min((self.spent + self._traced() * self.tracing) / self.plan.samples, 1.0)
 
     def error(self) -> float | None:
         """The estimated root mean square error, over pixels and channels; None below two samples."""

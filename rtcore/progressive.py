@@ -133,8 +133,6 @@ class Renderer:
             if cancelled() and not render.done:
                 render.number += 1      # when it goes on, it does so with the next pass
                 return
-            if render.done:
-                render.progress = 1.0
             yield render.frame(render.done)
             render.number += not render.done
 

@@ -50,25 +50,31 @@ def weight(one: Pass, width: int, height: int) -> float:
     return len(one.samples) * (0.75 if one.skip and not one.coarser else 1.0) / one.spacing ** 2
 
 
-def tiles(one: Pass, width: int, height: int, edges: Mapping[int, int] = EVEN) -> list[np.ndarray]:
-    """What the threads take one after the other: tiles as `eye.cast` takes them, coarse lattices first, each from the middle of the picture
-    outward; or parts of the list that have about as many rays. edges: by the lattice's spacing, or FURTHER, how many points a tile is
-    wide."""
+def tiles(one: Pass, width: int, height: int, edges: Mapping[int, int] = EVEN) -> np.ndarray:
+    """What the threads take one after the other, int64 (m, 8). Tiles as `eye.cast` takes them, coarse lattices first, each from the middle
+    of the picture outward. Or parts of the list that have about as many rays: the first of its rows, one past the last, rays, 1, zeros.
+    edges: by the lattice's spacing, or FURTHER, how many points a tile is wide."""
     if one.pixels is not None:
-        edge = edges[FURTHER]
-        rays = np.cumsum(one.pixels[:, 2] - one.pixels[:, 1])
-        cuts = np.searchsorted(rays, np.arange(edge ** 2, rays[-1], edge ** 2))
-        return [part for part in np.split(one.pixels, cuts) if len(part)]
+        return _parts(one.pixels, edges[FURTHER] ** 2)
     result = []
     for spacing in (*one.coarser, one.spacing):
         columns, rows, edge = -(-width // spacing), -(-height // spacing), edges[FURTHER if one.samples.start else spacing]
         skip = one.skip and spacing < COARSEST
-        result += [np.array([x, y, min(edge, columns - x), min(edge, rows - y), spacing, skip, width, height], np.int64)
+        result += [(x, y, min(edge, columns - x), min(edge, rows - y), spacing, skip, width, height)
                    for x, y in _corners(columns, rows, edge)]
     if one.region is not None:
         x0, y0, x1, y1 = one.region
         result = [tile for tile in result if tile[0] < x1 and tile[1] < y1 and tile[0] + tile[2] > x0 and tile[1] + tile[3] > y0]
-    return result
+    return np.array(result, np.int64).reshape(-1, 8)
+
+
+def _parts(pixels: np.ndarray, most: int) -> np.ndarray:
+    rays = np.concatenate([[0], np.cumsum(pixels[:, 2] - pixels[:, 1])])
+    cuts = np.unique(np.searchsorted(rays[1:], np.arange(0, rays[-1], most)))
+    parts = np.zeros((len(cuts), 8), np.int64)
+    parts[:, 0], parts[:, 1], parts[:, 3] = cuts, [*cuts[1:], len(pixels)], 1
+    parts[:, 2] = rays[parts[:, 1]] - rays[parts[:, 0]]
+    return parts
 
 
 def _corners(columns: int, rows: int, edge: int) -> list[tuple[int, int]]:

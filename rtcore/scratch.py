@@ -43,8 +43,8 @@ class Scratch:
             reaches[:] = words_of(UNTOLD)
             self._program, self._replaced = program, True
             self._state = State(
-                np.zeros(NUMBERS, np.int64), np.zeros(len(COUNTS), np.int64), self.clock.measure(laps), *self.waves, self.beam, self.target,
-                self.number, self.sample, np.zeros(kinds, bool), np.zeros(lamps + 1, np.int64), reaches,
+                np.zeros(NUMBERS, np.int64), np.zeros(len(COUNTS), np.int64), self.counts, self.clock.measure(laps), *self.waves,
+                self.beam, self.target, self.number, self.sample, np.zeros(kinds, bool), np.zeros(lamps + 1, np.int64), reaches,
                 no_kept(depth, lamps, kinds, self.dtype))
         if self._replaced:
             odd, even = self.waves

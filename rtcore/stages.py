@@ -1,27 +1,26 @@
-"""The way of a wave, stage after stage, without Python in between: from the eye's rays through hits, light, fog and bounces to the film.
+"""A thread's share of a pass without Python in between: tile after tile, and each stage after stage, from the eye's rays through hits,
+light, fog and bounces to the film.
 
 `advance` is compiled once for each precision and calls the stages' kernels by their addresses (`rtcore.indirect`), which the tracer gives
-it; a stage that the plan left out has none. It runs until the tile is done or something is wanted that only Python can do: room for more
+it; a stage that the plan left out has none. It runs until no tile is left or something is wanted that only Python can do: room for more
 rays, to look up what is known of first samples or to keep it. Then it says what, and goes on from there when it is called again.
 """
-import functools
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from rtcore import film as films, fog as fogs, shading
-from rtcore.bvh import EMPTY_TREE, Tree
+from rtcore import shading
+from rtcore.bvh import Tree
 from rtcore.clock import ticks
-from rtcore.indirect import address_of, call, caller, count_of, value_at
+from rtcore.indirect import call, caller, count_of, value_at
 from rtcore.jit import inline
 from rtcore.lanes import LANES
-from rtcore.lights import UNNOTED, UNTOLD, Draw, Reach
+from rtcore.lights import Draw, Reach
 from rtcore.lookup import OTHER, PART, Kept, compare, give_hits, give_reaches, give_rows
-from rtcore.scene import Background, Fog
 from rtcore.sampling import LIGHTS
 from rtcore.shapes.kind import Table
-from rtcore.wave import CLOSEST, UNWANTED, Beam, Wave, new_beam, new_wave
+from rtcore.todo import FINISHED, TAKEN, count_one
+from rtcore.wave import UNWANTED, Beam, Wave
 
 LEVEL = 1 << 12         # pairs of dimensions for the lights of one depth: so a light more changes nothing about the others
 SHADOW_RAYS = 8192      # of a wave toward several lights at once: more would leave the cache, and few cost less than their calls
@@ -31,32 +30,36 @@ COUNTS = ("reflection", "refraction", "primary", "primary_hits", "shadow", "shad
 REFLECTION, REFRACTION, PRIMARY, PRIMARY_HITS, SHADOW, SHADOW_HITS, NONFINITE = range(len(COUNTS))
 
 #: Steps: what comes next.
-RECALL, MEET, SURFACES, NOTE, GLOW, SHINE, CAST, GATHER, FADE, BOUNCE, NEXT, COMMIT, OVER = range(13)
+TAKE, SEND, RECALL, MEET, SURFACES, NOTE, GLOW, SHINE, CAST, GATHER, FADE, BOUNCE, NEXT, COMMIT, COUNT, AGAIN = range(16)
 
-#: What `advance` returns: the tile is done, or not wanted any more, or what Python is to do before it goes on.
-DONE, STALE, ROOM, RECALL_HITS, KEEP_HITS, KEEP_ROWS, NOTE_DOUBT, RECALL_SHADOWS, KEEP_SHADOWS, ROUGHEN, BEGIN_AGAIN = range(11)
+#: What `advance` returns: no tile is left, or none is wanted any more, or what Python is to do before it goes on.
+(DONE, STALE, ROOM, SPREAD, RECALL_TILE, RECALL_HITS, KEEP_HITS, KEEP_ROWS, NOTE_DOUBT, RECALL_SHADOWS, KEEP_SHADOWS, ROUGHEN,
+ COMMIT_SIGNED, KEEP_TILE, BEGIN_AGAIN) = range(15)
 
-#: Places in State.numbers. Of a tile: what comes next, how many rays the eye sends, whether they are first samples, whether something is
-#: known of them or to be kept (a `keep.Recall`), of how many waves all is known, the seed, the greatest depth.
-STEP, EYES, FIRST, RECALLING, WHOLE, SEED, MOST_DEPTH = range(7)
+#: Places in State.numbers. Of a pass: what comes next, the first sample of each pixel and the one after the last, whether something is
+#: known of them or to be kept (a `keep.Recall`), the seed, the greatest depth, the width of the picture.
+STEP, FIRST_SAMPLE, LAST_SAMPLE, RECALLING, SEED, MOST_DEPTH, WIDTH = range(7)
+#: Of a tile: its number, which sample it is at, whether that is the first, how many rays the eye sends, of how many waves all is known,
+#: whether something new is to be kept, whether it is traced once more because what was known did not do.
+TILE, SAMPLE, FIRST, EYES, WHOLE, KEEPING, CAREFUL = range(7, 14)
 #: Of the wave at hand: its depth, from 1, its rays, of how many of them the hit is known, whether the film is to note them, whether their
 #: surface rows are to be kept, whether a light's reach is known, whether it is a part of the kept wave.
-DEPTH, RAYS, KNOWN, NOTING, KEEPING_ROWS, REACHED, PARTLY = range(7, 14)
+DEPTH, RAYS, KNOWN, NOTING, KEEPING_ROWS, REACHED, PARTLY = range(14, 21)
 #: Of the lights at hand: the first of them and one past the last, how many rays go toward them, and of how many what they meet is known.
-LAMP, LAST_LAMP, CASTING, KNOWN_SHADOWS = range(14, 18)
-NUMBERS = 18
+LAMP, LAST_LAMP, CASTING, KNOWN_SHADOWS = range(21, 25)
+NUMBERS = 25
 
 #: Columns of Program.kinds.
 MEETS, SURFACE, FIRST_PRIM = range(3)
 #: Columns of Program.lamps.
 SHINES, SAMPLED = range(2)
 #: Places in Program.stages: 0 where there is no such stage.
-(FINDS, NOTES, GLOWS, NOTES_LIT, GATHERS, DIMS, DEPOSITS, BOUNCES, COMMITS, SHADOWED, DOUBTS, ROUGH,
- LASTS) = range(13)
-STAGES = 13
+(SENDS, SENDS_LIST, FINDS, NOTES, GLOWS, NOTES_LIT, GATHERS, DIMS, DEPOSITS, BOUNCES, COMMITS, SHADOWED, DOUBTS, ROUGH,
+ LASTS, NUMBERED, SPREADS) = range(17)
+STAGES = 17
 
 #: Where time goes (`clock.Clock.measure`): these, then two for each lamp, for each kind of shapes three.
-RECALLED, FILM, GLOWING, DIMMING, DEPOSITING, ONWARD = range(6)
+PRIMARY_RAYS, FILM, GLOWING, DIMMING, DEPOSITING, ONWARD = range(6)
 LAPS = 6
 
 
@@ -77,8 +80,9 @@ class Lamp(NamedTuple):
 class Program(NamedTuple):
     """What is done to a wave. Nothing in it changes; threads share it."""
 
-    stages: np.ndarray      # int64: addresses; of the last four whether (not 0) there are shadows, hits in doubt, rough
-                            # surfaces, surface rows to be kept
+    stages: np.ndarray      # int64: addresses; of the last six whether (not 0) there are shadows, hits in doubt, rough surfaces, surface
+                            # rows to be kept, whether something asks for a sample's number, whether samples leave the middles of pixels
+    eye: np.ndarray         # float64 (4, 3), the view of `eye.cast`
     kinds: np.ndarray       # int64 (k, 3): addresses of the two kernels, number of the first primitive
     primitives: np.ndarray  # int64 (k, words): Primitives
     ends: np.ndarray        # int64 (k): one past each kind's last primitive
@@ -94,7 +98,8 @@ class State(NamedTuple):
     """How far a thread is with its tile, and its arrays."""
 
     numbers: np.ndarray     # int64, as named above
-    counts: np.ndarray      # int64, see COUNTS
+    counts: np.ndarray      # int64, see COUNTS: of the rays at hand and all that come of them
+    total: np.ndarray       # of all that have come to their end
     ticks: np.ndarray       # int64, see `clock.Clock.measure`
     odd: Wave               # of odd depths, as the eye's is
     even: Wave
@@ -195,9 +200,36 @@ def _shine(program, state, film, wave, n, since):
     return since
 
 
+@inline
+def _send(program, state, film, todo):
+    """The eye's rays for the tile and sample at hand, as the first wave; returns how many, 0 if the film has them already."""
+    s, stages, tile, target = state.numbers, program.stages, todo.tiles[state.numbers[TILE]], state.target
+    if todo.pixels.shape[0] > 0:
+        pixels = todo.pixels[tile[0]:tile[1]]
+        if film.count[pixels[0, 0]] > pixels[0, 1]:
+            return 0
+        return count_of(stages[SENDS_LIST], (state.odd, target, state.number, program.eye, s[WIDTH], pixels, s[SEED]))
+    n = count_of(stages[SENDS], (state.odd, target, program.eye, tile, s[SAMPLE], s[SEED]))
+    if n > 0 and film.count[target[0]] > s[SAMPLE]:
+        return 0
+    if stages[NUMBERED] != 0:
+        for i in range(n):
+            state.number[i] = s[SAMPLE]
+    return n
+
+
+@inline
+def _begin(s, n, counts, shadowed):
+    """Nothing has come of the eye's n rays yet."""
+    for k in range(counts.shape[0]):
+        counts[k] = 0
+    counts[PRIMARY], s[EYES], s[RAYS], s[DEPTH] = n, n, n, 1
+    s[WHOLE], s[KEEPING], s[KEEPING_ROWS], s[PARTLY], s[REACHED] = 0, 0, 0, 0, not shadowed
+
+
 @caller
-def advance(program, state, film):
-    """Run one stage after the other, from `State.numbers[STEP]`, until the tile is done or Python is needed; returns for what."""
+def advance(program, state, film, todo):
+    """Run one stage after the other, from `State.numbers[STEP]`, until no tile is left or Python is needed; returns for what."""
     s, counts, spent, stages, beam, lamps = state.numbers, state.counts, state.ticks, program.stages, state.beam, program.lamps.shape[0]
     hits = LAPS + 2 * lamps         # laps of the first kind
     surfaces, shadows = hits + 1, hits + 2
@@ -207,11 +239,31 @@ def advance(program, state, film):
         wave = state.odd if depth % 2 == 1 else state.even
         child = state.even if depth % 2 == 1 else state.odd
         rays = wave.rays
-        if step == RECALL:
+        if step == TAKE:
+            s[TILE], s[SAMPLE], s[STEP], s[DEPTH] = count_one(todo.counters, TAKEN), s[FIRST_SAMPLE], SEND, 1
+            if s[TILE] >= todo.tiles.shape[0]:
+                return DONE
+        elif step == SEND:
+            most, listed = todo.tiles[s[TILE], 2] * todo.tiles[s[TILE], 3], todo.pixels.shape[0] > 0
+            if rays.tally[UNWANTED] != 0:
+                return STALE
+            if state.target.shape[0] < most or wave.owner.shape[0] < most:
+                return ROOM
+            n = _send(program, state, film, todo)
+            since = _lap(spent, PRIMARY_RAYS, since)
+            s[STEP] = RECALL if n > 0 else AGAIN
+            if n > 0:
+                _begin(s, n, counts, stages[SHADOWED] != 0)
+                s[FIRST] = s[NOTING] = s[SAMPLE] == 0 and not listed
+                if s[RECALLING] != 0:
+                    return RECALL_TILE
+                if stages[SPREADS] != 0 and s[FIRST] == 0:      # a first sample is the pixel's middle
+                    return SPREAD
+        elif step == RECALL:
             s[STEP], s[KNOWN] = MEET, 0
             if depth <= s[WHOLE] and _recall(state, depth, wave, n, stages):
                 s[STEP] = SURFACES
-                since = _lap(spent, RECALLED if depth == 1 else ONWARD, since)      # looking up counts to what it spares
+                since = _lap(spent, PRIMARY_RAYS if depth == 1 else ONWARD, since)      # looking up counts to what it spares
                 continue
             if s[PARTLY] != 0:
                 return BEGIN_AGAIN
@@ -300,42 +352,19 @@ def advance(program, state, film):
         elif step == NEXT:
             s[STEP], s[DEPTH] = RECALL if n > 0 else COMMIT, depth + 1
         elif step == COMMIT:
-            s[STEP] = OVER
-            if stages[COMMITS] != 0:
-                counts[NONFINITE] += count_of(stages[COMMITS], (film, state.sample, s[EYES], state.target))
-                since = _lap(spent, FILM, since)
+            s[STEP] = COUNT
+            if stages[COMMITS] == 0:
+                return COMMIT_SIGNED
+            counts[NONFINITE] += count_of(stages[COMMITS], (film, state.sample, s[EYES], state.target))
+            since = _lap(spent, FILM, since)
+        elif step == COUNT:
+            for k in range(counts.shape[0]):
+                state.total[k] += counts[k]
+            s[STEP], s[EYES] = AGAIN, 0
+            if s[KEEPING] != 0:
+                return KEEP_TILE
         else:
-            return DONE
-
-
-def no_primitives(dtype) -> Primitives:
-    """None at all, of no kind."""
-    return Primitives(EMPTY_TREE, Table(np.zeros((0, 0), dtype), np.zeros((0, 0), dtype), np.zeros(0, np.int8), np.zeros((0, 0))))
-
-
-@functools.cache
-def _examples(dtype) -> dict[str, tuple]:
-    """Arguments like those that each sort of kernel gets."""
-    wave, beam, film, none = new_wave(0, dtype), new_beam(0, 0, dtype), films.new_film(0, 0), np.zeros(0, np.int32)
-    look = shading.make_look((), none, np.zeros(3), Background(), (0, 1, 0))
-    shine = (wave, 0, np.zeros(1), np.zeros(3), beam, 0, Reach(UNTOLD, UNNOTED, none, np.float32(1)))
-    return {
-        "meets": (wave.rays, 0, *no_primitives(dtype), 0, CLOSEST), "surface": (wave.rays, 0, wave.surface, no_primitives(dtype).table, 0),
-        "finds": (wave.rays.prim, 0, np.zeros(0, np.int64), np.zeros(0, bool)), "notes": (film, wave, 0, none),
-        "glows": (wave, 0, look, beam.answer), "shines": shine, "shines sampled": (*shine, Draw(none, none, 0, 0)),
-        "notes lit": (film, beam, 0, none, np.float32(1)), "gathers": (wave, beam, 0), "dims": (wave, 0, fogs.numbers(Fog())),
-        "deposits": (wave, 0, np.zeros((3, 0), np.float32), True), "bounces": (wave, 0, look, wave, np.zeros(0, np.int64)),
-        "commits": (film, np.zeros((3, 0), np.float32), 0, none)}
-
-
-ADDRESSES: dict[tuple, int] = {}        # by kernel and precision: to ask numba for one takes some 50 us
-
-
-def address(kernel, sort: str, dtype, table: Table | None = None) -> int:
-    """Where a kernel of this sort begins, see `_examples`; table: for those of a kind of shapes, one of that kind's."""
-    key = kernel, dtype
-    if key not in ADDRESSES:
-        like = tuple(table if table is not None and isinstance(value, Table) else value for value in _examples(dtype)[sort])
-        counts = sort.startswith("shines") or sort in ("gathers", "bounces", "commits")
-        ADDRESSES[key] = address_of(kernel, like, types.int64 if counts else types.none)
-    return ADDRESSES[key]
+            s[STEP], s[DEPTH], s[SAMPLE] = SEND, 1, s[SAMPLE] + 1
+            if s[SAMPLE] >= s[LAST_SAMPLE]:
+                count_one(todo.counters, FINISHED)
+                s[STEP] = TAKE

@@ -1,10 +1,12 @@
-"""The tracing of a tile: which stages a picture's waves go through, and what only Python can do on their way."""
+"""The tracing of tiles: which stages a picture's waves go through, and what only Python can do on their way."""
 from collections import defaultdict
 from collections.abc import Callable
 
 import numpy as np
 
 from rtcore import film as films, filters, fog as fogs, gloss, shading, stages
+from rtcore.adaptive import FIRST as EVENLY
+from rtcore.addresses import address, no_primitives
 from rtcore.edits import shadow_key
 from rtcore.eye import cast, cast_list
 from rtcore.flatten import Geometry
@@ -18,8 +20,9 @@ from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.scratch import Scratch
 from rtcore.settings import Settings
-from rtcore.stages import (CASTING, DEPTH, KEEPING_ROWS, KNOWN, KNOWN_SHADOWS, LAMP, LAST_LAMP, NOTING, PRIMARY, PRIMARY_HITS, RAYS,
-                           REACHED, REFLECTION, REFRACTION, SHADOW_HITS, Lamp, Program, State, address, advance, no_primitives)
+from rtcore.stages import (CAREFUL, CASTING, DEPTH, EYES, KEEPING, KEEPING_ROWS, KNOWN, KNOWN_SHADOWS, LAMP, LAST_LAMP, NOTING, PRIMARY,
+                           PRIMARY_HITS, RAYS, REACHED, REFLECTION, REFRACTION, SHADOW_HITS, TILE, WHOLE, Lamp, Program, State, advance)
+from rtcore.todo import Todo
 from rtcore.wave import Wave, find_kinds
 
 #: What time is counted to: stages of the plan and groups of kernels.
@@ -40,9 +43,7 @@ class Tracer:
         self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.code = CODE[geometry.dtype]
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
-        # something asks which sample a ray belongs to
         self.filter = filters.made(settings.filter) if plan.filter else None
-        self.numbered = lens is not None or plan.gloss or plan.filter or any(isinstance(light, SAMPLED) for light in plan.lights)
         self.shadow_keys = [shadow_key(light) for light in plan.lights]     # what their shadows depend on
         # numbers of primitives whose surface rows are kept
         self.lasting = [(group.first, group.first + len(group.owner)) for group in geometry.groups if group.kind.lasting]
@@ -68,8 +69,11 @@ class Tracer:
             lamps[j] = address(SHINE[type(light)], "shines sampled" if sampled else "shines", dtype), sampled
             numbers[j] = words_of(lamp)
             self._held.append(lamp)
-        bright, signed = VIEW[self.settings.view].needs_light, self.filter is not None and self.filter.gain < 1
-        wanted = [(stages.FINDS, find_kinds, "finds", len(groups) > 1), (stages.NOTES, films.note_first_hits, "notes", True),
+        settings, view = self.settings, np.array(self.view, float)
+        bright, signed = VIEW[settings.view].needs_light, self.filter is not None and self.filter.gain < 1
+        listed = settings.adaptive and plan.samples > EVENLY
+        wanted = [(stages.SENDS, cast, "sends", True), (stages.SENDS_LIST, cast_list, "sends list", listed),
+                  (stages.FINDS, find_kinds, "finds", len(groups) > 1), (stages.NOTES, films.note_first_hits, "notes", True),
                   (stages.GLOWS, shading.glow, "glows", bright), (stages.GATHERS, shading.gather, "gathers", plan.lights),
                   (stages.NOTES_LIT, films.note_lit, "notes lit", lit and plan.lights),
                   (stages.DIMS, fogs.dim, "dims", plan.fog), (stages.DEPOSITS, films.deposit, "deposits", bright),
@@ -78,10 +82,12 @@ class Tracer:
         for place, kernel, sort, needed in wanted:
             chosen[place] = address(kernel, sort, dtype) if needed else 0
         chosen[stages.SHADOWED], chosen[stages.ROUGH], chosen[stages.LASTS] = plan.shadows, plan.gloss, any(self.lasting_kinds)
+        chosen[stages.SPREADS] = self.filter is not None or self.lens is not None
+        chosen[stages.NUMBERED] = chosen[stages.SPREADS] or plan.gloss or any(isinstance(light, SAMPLED) for light in plan.lights)
         chosen[stages.DOUBTS] = any(group.kind.doubtful or group.kind.textbook and plan.textbook for group in groups)
         ends = np.array([group.first + len(group.owner) for group in groups], np.int64)
         fogged = fogs.numbers(fog) if plan.fog else np.zeros(0)
-        return Program(chosen, kinds, primitives, ends, lamps, numbers, fogged, self.look, like, no_lamp)
+        return Program(chosen, view, kinds, primitives, ends, lamps, numbers, fogged, self.look, like, no_lamp)
 
     def _named(self) -> tuple[tuple[str, str], ...]:
         """What the ticks of `stages.advance` are for."""
@@ -102,101 +108,72 @@ class Tracer:
             code = self.code[kernel] = kernel.compile(tuple(map(typed, arguments)))
         return code(*arguments)
 
-    def tile(self, scratch: Scratch, film: films.Film, tile: np.ndarray, sample: int, stale: Callable[[], bool],
-             memory: Memory | None = None) -> bool:
-        """Trace one sample of a tile (see `eye.cast`) onto the film, unless it is there already; False if it was given up half way, the
-        film then as before. With a memory, what first samples have met is taken from there and kept there."""
-        scratch.clock.start()
-        n = self._cast(scratch, tile, sample)
-        if n == 0 or film.count[scratch.target[0]] > sample:
-            return True
-        if sample > 0 or memory is None:
-            return self._trace(scratch, film, n, stale, sample == 0)
-        recall = memory.recall(tile)
-        done = self._trace(scratch, film, n, stale, True, recall)
-        if done is None:
-            n, recall = self._cast(scratch, tile, sample), memory.recall(tile)
-            done = self._trace(scratch, film, n, stale, True, recall, careful=True)
-        if done and recall.grown:
-            memory.keep(tile, recall)
-        return done
-
-    def _cast(self, scratch: Scratch, tile: np.ndarray, sample: int) -> int:
-        """Send the eye's rays; returns how many."""
-        wave = scratch.primary(int(tile[2] * tile[3]))
-        n = self.run(cast, wave, scratch.target, self.view, tile, sample, self.settings.seed)
-        if self.numbered:
-            scratch.number[:n] = sample
-        return n
-
-    def listed(self, scratch: Scratch, film: films.Film, pixels: np.ndarray, stale: Callable[[], bool]) -> bool:
-        """The same for further samples of a list of pixels (see `eye.cast_list`)."""
-        if film.count[pixels[0, 0]] > pixels[0, 1]:
-            return True
-        each = pixels[:, 2] - pixels[:, 1]
-        wave = scratch.primary(int(each.sum()))
-        scratch.clock.start()
-        n = self.run(cast_list, wave, scratch.target, self.view, self.settings.size[0], pixels, self.settings.seed)
-        if self.numbered:
-            scratch.number[:n] = np.arange(n) - np.repeat(np.cumsum(each) - pixels[:, 2], each)
-        return self._trace(scratch, film, n, stale, first=False)
-
-    def _trace(self, scratch: Scratch, film: films.Film, n: int, stale: Callable[[], bool], first: bool,
-               recall: Recall | None = None, careful: bool = False) -> bool | None:
-        """Follow a wave of primary rays and add what it brings to the film; note what it hits if it holds its pixels' first samples. None:
-        it has come upon something new behind a wave that is a part of a known one, and has to be cast and traced again, carefully."""
-        clock, wave, size = scratch.clock, scratch.waves[0], self.settings.size
-        clock.lap(CAST)
-        if self.filter is not None and not first:       # a first sample is the pixel's centre
-            filters.spread(wave, n, scratch.target, scratch.number, self.view, size[0], self.filter.place, self.filter.sign,
-                           self.settings.seed, scratch.signs)
-            clock.lap(SPREAD)
-        if self.lens is not None and not first:         # and goes through the middle
-            bend(wave, n, scratch.target, scratch.number, self.lens, self.settings.seed)
-            clock.lap(BEND)
-        known, settings, shadows = recall is not None, self.settings, self.plan.shadows
-        arrays = self.program, self.laps, shadows, settings.max_depth, known
-        state, whole = scratch.state(*arrays), 0
-        if known and not careful:
-            whole = write_down(state.kept, recall.whole(), self.shadow_keys if shadows else [], self.lasting_kinds, len(wave.surface))
-        of_tile = stages.RECALL, n, first, known, whole, settings.seed, settings.max_depth
-        of_wave = 1, n, 0, first and not (known and recall.noted), False, not shadows, False
-        state.numbers[:] = (*of_tile, *of_wave, 0, 0, 0, 0)
-        state.counts[:] = 0
-        state.counts[PRIMARY] = n
-        if not known and shadows:
+    def trace(self, scratch: Scratch, film: films.Film, todo: Todo, samples: range, stale: Callable[[], bool],
+              memory: Memory | None = None) -> bool:
+        """Trace these samples of tiles, or parts of a list, onto the film as long as there are any, but for those that are there already.
+        False if it was given up; the film is then as it was before the tile at hand. With a memory, what first samples have met is taken
+        from there and kept there."""
+        keeping, settings, shadows = memory is not None and samples.start == 0 and len(todo.pixels) == 0, self.settings, self.plan.shadows
+        arrays = self.program, self.laps, shadows, settings.max_depth, keeping
+        state, recall = scratch.state(*arrays), None
+        state.numbers[:] = 0
+        state.numbers[stages.STEP:stages.WIDTH + 1] = (stages.TAKE, samples.start, samples.stop, keeping, settings.seed, settings.max_depth,
+                                                       settings.size[0])
+        if not keeping and shadows:
             state.reaches[:] = UNREACHED
-        while (wanted := self.run(advance, self.program, state, film)) != stages.DONE:
-            if wanted in (stages.STALE, stages.BEGIN_AGAIN) or stale():
-                if first and len(film.lit):     # what it noted of lights does not count
-                    film.lit[scratch.target[:n]] = 0
-                return None if wanted == stages.BEGIN_AGAIN else False
-            clock.start()
-            self._serve(wanted, scratch, state, film, recall)
+        while (wanted := self.run(advance, self.program, state, film, todo)) != stages.DONE:
+            if wanted == stages.STALE or wanted != stages.KEEP_TILE and stale():
+                self._forget_lit(scratch, state, film)
+                return False
+            scratch.clock.start()
+            if wanted == stages.RECALL_TILE:
+                recall = memory.recall(todo.tiles[state.numbers[TILE]])
+                self._recall_tile(state, scratch.waves[0], recall)
+                scratch.clock.lap(CAST)
+            elif wanted == stages.KEEP_TILE:
+                recall.passed(1)
+                recall.note_film()
+                if recall.grown:
+                    memory.keep(todo.tiles[state.numbers[TILE]], recall)
+                scratch.clock.lap(FILM)
+            else:
+                self._serve(wanted, scratch, state, film, todo, recall)
             state = scratch.state(*arrays)
-        scratch.counts += state.counts
-        if known:
-            recall.passed(1)
-            recall.note_film()
-        if len(film.plain):
-            clock.start()
-            if first:
-                scratch.signs[:n] = 1
-            scratch.counts[stages.NONFINITE] += filters.commit(film, scratch.sample, n, scratch.target, scratch.signs)
-            clock.lap(FILM)
         return True
 
-    def _serve(self, wanted: int, scratch: Scratch, state: State, film: films.Film, recall: Recall | None) -> None:
-        """Do what `stages.advance` can't."""
+    def _forget_lit(self, scratch: Scratch, state: State, film: films.Film) -> None:
+        """What the film has noted of lights on the tile at hand does not count."""
+        if state.numbers[stages.FIRST] and len(film.lit):
+            film.lit[scratch.target[:state.numbers[EYES]]] = 0
+
+    def _recall_tile(self, state: State, wave: Wave, recall: Recall) -> None:
+        """Let it be known what is known of the tile at hand; nothing of it beforehand if it is to be gone through carefully."""
+        numbers, shadows = state.numbers, self.plan.shadows
+        if not numbers[CAREFUL]:
+            numbers[WHOLE] = write_down(state.kept, recall.whole(), self.shadow_keys if shadows else [], self.lasting_kinds,
+                                        len(wave.surface))
+        numbers[CAREFUL] = False
+        numbers[NOTING] = numbers[KEEPING] = not recall.noted
+
+    def _serve(self, wanted: int, scratch: Scratch, state: State, film: films.Film, todo: Todo, recall: Recall | None) -> None:
+        """Do what `stages.advance` can't for the wave at hand."""
         numbers, counts, clock = state.numbers, state.counts, scratch.clock
         depth, n = int(numbers[DEPTH]), int(numbers[RAYS])
         wave = state.odd if depth % 2 else state.even
         if wanted == stages.ROOM:
-            if numbers[stages.STEP] == stages.BOUNCE:
+            if numbers[stages.STEP] == stages.SEND:
+                scratch.primary(int(todo.tiles[numbers[TILE], 2:4].prod()))
+            elif numbers[stages.STEP] == stages.BOUNCE:
                 scratch.wave(depth, 2 * n)
             else:
                 scratch.beams(n, int(numbers[LAST_LAMP]))
+        elif wanted == stages.SPREAD:
+            self._spread(scratch, wave, n)
+        elif wanted == stages.BEGIN_AGAIN:      # something new has come behind a wave that is a part of a known one
+            self._forget_lit(scratch, state, film)
+            numbers[stages.STEP], numbers[CAREFUL] = stages.SEND, True
         elif wanted == stages.RECALL_HITS:
+            numbers[KEEPING] = True
             recall.passed(depth - 1)
             known, hits, reflected, refracted = recall.hits(wave, n)
             if depth == 1:
@@ -219,6 +196,7 @@ class Tracer:
             self._note_doubt(film, wave, n, scratch.target)
             clock.lap(FILM)
         elif wanted == stages.RECALL_SHADOWS:
+            numbers[KEEPING] = True
             recall.passed(depth)
             known = sum(last - first - recall.shadows(state.beam, key, first, last) for key, first, last in self._casting(state))
             counts[SHADOW_HITS] -= int(np.count_nonzero(state.beam.rays.prim[:numbers[CASTING]] >= 0))
@@ -229,9 +207,26 @@ class Tracer:
                 recall.note_shadows(state.beam, key, first, last)
             clock.lap(SHADOWS)
         elif wanted == stages.ROUGHEN:      # n are those sent on already
-            child, before = state.even if depth % 2 else state.odd, scratch.path(depth - 1, int(numbers[stages.EYES]) if depth == 1 else 0)
+            child, before = state.even if depth % 2 else state.odd, scratch.path(depth - 1, int(numbers[EYES]) if depth == 1 else 0)
             gloss.roughen(wave, child, n, self.look, before, scratch.path(depth, n), scratch.target, scratch.number, self.settings.seed)
             clock.lap(ROUGHEN)
+        elif wanted == stages.COMMIT_SIGNED:
+            eyes = int(numbers[EYES])
+            if numbers[stages.FIRST]:
+                scratch.signs[:eyes] = 1
+            counts[stages.NONFINITE] += filters.commit(film, scratch.sample, eyes, scratch.target, scratch.signs)
+            clock.lap(FILM)
+
+    def _spread(self, scratch: Scratch, wave: Wave, n: int) -> None:
+        """Let samples leave the middles of their pixels, and the middle of the lens."""
+        clock, target, number, seed = scratch.clock, scratch.target, scratch.number, self.settings.seed
+        if self.filter is not None:
+            filters.spread(wave, n, target, number, self.view, self.settings.size[0], self.filter.place, self.filter.sign, seed,
+                           scratch.signs)
+            clock.lap(SPREAD)
+        if self.lens is not None:
+            bend(wave, n, target, number, self.lens, seed)
+            clock.lap(BEND)
 
     def _keep_hits(self, state: State, wave: Wave, n: int, recall: Recall) -> None:
         """The wave has met what it meets: keep that, and find out what else is known of it."""

@@ -21,6 +21,7 @@ from rtcore.scratch import Scratch
 from rtcore.settings import Settings
 from rtcore.shapes import KIND_MODULES, TEXTBOOK, kind_named
 from rtcore.stages import COUNTS
+from rtcore.todo import new_todo
 from rtcore.trace import Tracer
 from rtcore.wave import CLOSEST, NO_ANSWER, SURFACE_ROWS, find_kinds, new_beam, new_rays, new_wave
 
@@ -51,7 +52,7 @@ def _advance(dtype):
     scene, settings, camera = Scene(), Settings(view="depth", precision=_precision(dtype)), Camera()
     tracer = Tracer(flatten(scene, settings.precision), plan(scene, settings), settings, camera.rays(8, 8), None, camera.up, Background(),
                     None, False)
-    tracer.tile(Scratch(dtype, True), films.new_film(8, 8), np.array([0, 0, 8, 8, 1, 0, 8, 8], np.int64), 0, lambda: False)
+    tracer.trace(Scratch(dtype, True), films.new_film(8, 8), new_todo(np.array([[0, 0, 8, 8, 1, 0, 8, 8]])), range(1), lambda: False)
 
 
 def _precision(dtype):
@@ -85,7 +86,7 @@ def _doubt(dtype):
 
 def _samples(dtype):
     wave, target, _ = _wave(dtype)
-    eye.cast_list(wave, target, Camera().rays(8, 8), 8, np.array([[p, 1, 2] for p in range(64)], np.int32), 0)
+    eye.cast_list(wave, target, np.empty(64, np.int32), Camera().rays(8, 8), 8, np.array([[p, 1, 2] for p in range(64)], np.int32), 0)
     films.rmse_estimate(films.new_film(8, 8))
 
 

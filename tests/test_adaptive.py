@@ -145,9 +145,10 @@ def test_the_order_has_every_pixel_once_block_by_block(size):
 def test_a_list_is_cut_into_parts_of_about_a_tile():
     pixels = np.array([[p, 8, 8 + (4096 if p == 5 else 24)] for p in range(1000)], np.int32)
     one = Pass(1, False, range(0), pixels)
-    parts = tiles(one, 40, 25)
+    found = tiles(one, 40, 25)
+    parts = [pixels[first:last] for first, last, *_ in found]
     assert np.concatenate(parts).tolist() == pixels.tolist()
-    assert all((part[:, 2] - part[:, 1]).sum() < TILE ** 2 + 4096 for part in parts)
+    assert all((part[:, 2] - part[:, 1]).sum() == rays * one < TILE ** 2 + 4096 for part, (_, _, rays, one, *_) in zip(parts, found))
     assert weight(one, 40, 25) == (999 * 24 + 4096) / 1000
 
 
@@ -248,8 +249,9 @@ def test_a_view_without_light_has_none_to_go_on_with():
     assert last.pixels.tobytes() == rtcore.render(BALLS, SIZE, 2).pixels.tobytes()
 
 
-def test_a_stopped_render_goes_on_wherever_it_was_stopped():
-    renderer, settings = Renderer(), Settings(size=(300, 200), samples=12, adaptive=True, threads=2)
+def test_a_stopped_render_goes_on_wherever_it_was_stopped(monkeypatch):
+    monkeypatch.setattr("rtcore.picture.LOOK", 0.0002)      # seconds between two questions while a pass is traced
+    renderer, settings = Renderer(), Settings(size=(480, 320), samples=12, adaptive=True, threads=2)
     request, last, stops = RenderRequest(BALLS, BALLS.camera, settings), None, 0
 
     def patience(calls):
@@ -261,9 +263,9 @@ def test_a_stopped_render_goes_on_wherever_it_was_stopped():
             return left[0] < 0
         return tired
     while last is None or not last.done:
-        for frame in renderer.frames(request, patience(17 + 4 * stops)):
+        for frame in renderer.frames(request, patience(3 + stops // 2)):
             last = frame
         stops += 1
     renderer.close()
-    whole = rtcore.render(BALLS, (300, 200), 12, adaptive=True)
+    whole = rtcore.render(BALLS, (480, 320), 12, adaptive=True)
     assert stops > 10 and last.pixels.tobytes() == whole.pixels.tobytes() and last.rays == whole.stats["rays"]

@@ -19,7 +19,8 @@ LAYERS = (
     {"rtcore.leaves", "rtcore.scene"},
     {"rtcore.latest"},
     {"rtcore.across", "rtcore.directions", "rtcore.clock", "rtcore.exact", "rtcore.expansions", "rtcore.indices", "rtcore.indirect",
-     "rtcore.jit", "rtcore.lanes", "rtcore.memory", "rtcore.neighbours", "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.wave"},
+     "rtcore.jit", "rtcore.lanes", "rtcore.memory", "rtcore.neighbours", "rtcore.pairs", "rtcore.powers", "rtcore.rows", "rtcore.todo",
+     "rtcore.wave"},
     # shapes walk the tree in their kernels, so it comes before them
     {"rtcore.bvh", "rtcore.pyramid", "rtcore.turns", "rtcore.walk", "rtcore.sampling", "rtcore.roots"},
     {"rtcore.shapes", "rtcore.lights", "rtcore.views"},
@@ -28,6 +29,7 @@ LAYERS = (
     {"rtcore.files", "rtcore.flatten", "rtcore.plan", "rtcore.edits"},
     {"rtcore.lookup"},
     {"rtcore.stages"},
+    {"rtcore.addresses"},
     {"rtcore.scratch"},
     {"rtcore.algebra", "rtcore.recast", "rtcore.trace"},
     {"rtcore.picture"},
