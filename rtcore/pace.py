@@ -3,7 +3,7 @@ import math
 
 from rtcore.schedule import COARSEST, LATTICES, TILE
 
-EDGES = (3 * TILE, 2 * TILE, TILE, TILE // 2, TILE // 4)
+EDGES = (2 * TILE, TILE, TILE // 2, TILE // 4)
 ENOUGH, FEWER = 6, 3    # tiles for each thread, so that they end at about the same time; of a coarse lattice, which is soon done
 LONG = 0.1          # seconds that a tile may take, so that threads end at about the same time: kernels see it sooner if it is not wanted
 SAFE = 0.8          # share of the deadline that is planned with: one view takes longer than the one before

@@ -285,6 +285,13 @@ class Held:
         self.signatures = {(one.py_func.__qualname__, str(signature)) for one in kernels.values() for signature in one.signatures}
 
 
+def select(window: Window, place: Place):
+    """What the property editor shows of it comes to stay."""
+    window.session.select(place)
+    window.panels["Properties"].complete()
+    wait(lambda: False, 0.05)
+
+
 def warm_up(window: Window, scenes: list[Path]):
     """Show all that is shown later, so that everything that comes to stay is there."""
     session = window.session
@@ -303,6 +310,10 @@ def warm_up(window: Window, scenes: list[Path]):
             session.edit_record(place, msgspec.structs.replace(node_at(session.scene, place.key), visible=False), "hide")
             settled()
             session.document.undo()
+            select(window, place)
+        for light in range(len(session.scene.lights or ())):
+            select(window, Place("light", light))
+        session.select(None)
         settled()
     for name in (*VIEW_NAMES, "beauty"):
         session.set_options(msgspec.structs.replace(session.options, view=name))
@@ -354,7 +365,8 @@ def report(heart: Heart, one: Soak, before: Held, after: Held) -> str:
              f"these the longest {max((stall.ours for stall in heart.stalls), default=0) * 1000:.1f} ms",
              f"threads {len(before.threads)} -> {len(after.threads)}, memory {before.memory:.0f} -> {after.memory:.0f} MiB, "
              f"signatures {len(before.signatures)} -> {len(after.signatures)}"
-             + "".join(f", {name}" for name, _ in after.signatures - before.signatures),
+             + "".join(f", {name}" for name, _ in after.signatures - before.signatures)
+             + "".join(f", thread {name}" for name in set(after.threads) - set(before.threads)),
              "done: " + ", ".join(f"{name} {count}" for name, count in sorted(one.done.items()))]
     lines += [f"  at {stall.at:6.1f} s {stall.doing:8} {stall.took * 1000:6.1f} ms, ran {stall.ran * 1000:6.1f}, no processor "
               f"{stall.waited * 1000:6.1f}, processor asleep {stall.asleep * 1000:5.1f}" for stall in heart.stalls if stall.ours > PATIENCE]

@@ -1,7 +1,11 @@
 """The property editor keeps its forms: what is of one structure is shown in the same ones, and no edit goes to the wrong thing."""
+import gc
+import weakref
+
 import pytest
 from PySide6.QtCore import Qt
 
+from app.garbage import settle
 from app.panels.properties import KEPT
 from app.places import Place, node_at
 from app.theme import LIGHT
@@ -105,3 +109,21 @@ def test_a_change_of_theme_makes_them_anew(panel, session, window, qtbot):
     panel.complete()
     assert panel.forms is not first and panel.forms["shape"].editors["radius"].entries[0].text() == "0.5"
     assert len(panel._bodies) == 1
+
+
+def test_a_body_taken_down_leaves_nothing_though_it_was_set_aside(panel, session, qtbot):
+    """Whatever the garbage collector has set aside it never looks through again: forms must go without it."""
+    held = []
+    for number in range(5):
+        shown(panel, session, number)
+        held += [weakref.ref(one) for form in panel.forms.values() for one in (form, *form.editors.values(), *form.bindings.values())]
+    held += [weakref.ref(body) for body in panel._bodies.values()]
+    session.select(None)
+    try:
+        settle()
+        gc.disable()
+        panel.dress(LIGHT)
+        qtbot.waitUntil(lambda: not any(one() for one in held))
+    finally:
+        gc.unfreeze()
+        gc.enable()
