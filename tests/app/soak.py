@@ -6,13 +6,10 @@ Prints how long the window's thread did not answer, and what threads, memory and
 """
 import argparse
 import contextlib
-import ctypes
-import gc
 import os
 import random
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +20,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 import msgspec  # noqa: E402
 import numpy as np  # noqa: E402
 from heart import PATIENCE, Heart  # noqa: E402
-from numba.core.dispatcher import Dispatcher  # noqa: E402
+from held import Held  # noqa: E402
 from PySide6.QtCore import QEvent, QEventLoop, QObject, QPoint, QPointF, QSettings, Qt, QTimer, Slot  # noqa: E402
 from PySide6.QtGui import QMouseEvent, QWheelEvent  # noqa: E402
 from PySide6.QtWidgets import QApplication  # noqa: E402
@@ -269,20 +266,6 @@ def finished(window: Window, path: Path) -> bool:
     result = wait(there, 300)
     window.filing.opened.disconnect(opened.append)
     return result
-
-
-class Held:
-    """What the process holds: threads by name, MiB of memory, kernels' signatures."""
-
-    def __init__(self):
-        gc.collect()
-        ctypes.CDLL(None).malloc_trim(0)        # what is free goes back to the system: pictures of other sizes leave holes
-        self.threads = sorted(thread.name for thread in threading.enumerate())
-        with open("/proc/self/statm", encoding="ascii") as file:
-            self.memory = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / (1 << 20)
-        kernels = {id(value): value for module in list(sys.modules.values()) if getattr(module, "__name__", "").startswith("rtcore")
-                   for value in vars(module).values() if isinstance(value, Dispatcher)}
-        self.signatures = {(one.py_func.__qualname__, str(signature)) for one in kernels.values() for signature in one.signatures}
 
 
 def select(window: Window, place: Place):
