@@ -40,11 +40,11 @@ MARGIN = 1e-5       # by which boxes are made larger, of their corners' coordina
 class Renderer:
     """Renders one request after another, keeping from one to the next what has not changed: arrays of the scene, threads and their arrays;
     with `keep` also what first samples have met (`rtcore.keep`), as far as the edit leaves it (`rtcore.edits`), and finished samples.
-    Not for two threads at once. give_way: called now and then while shapes are packed, which is Python's work and takes long where there
-    are many; it may wait a little for another thread."""
+    Not for two threads at once. give_way: called now and then while a picture is prepared, which is Python's work and takes long where
+    there are many shapes; it may wait a little for another thread."""
 
     def __init__(self, keep: bool = False, give_way: Callable[[], None] | None = None):
-        self._keep, self._give_way = keep, give_way
+        self._keep, self._give_way = keep, give_way or (lambda: None)
         self._geometry: Geometry | None = None
         self._scene: Scene | None = None
         self._pool: ThreadPoolExecutor | None = None
@@ -140,6 +140,7 @@ class Renderer:
                deadline: float | None) -> Render:
         """A new picture, from what is left of the one before."""
         pace, memory, goes_on = self._pace, Memory() if self._keep else None, False
+        self._give_way()
         what = Change(frozenset(), ())
         if self._keep and before is not None:
             what = change(before.request, request, before.tracer.geometry.leaves, geometry.leaves)
@@ -159,6 +160,7 @@ class Renderer:
                 if all(what.extent(step) == KEPT for step in ("hits", "onward", "shadows")):
                     soon = max(soon, KNOWN)     # nothing is to be traced: whole pictures, though they be a little late
             first = pace.finest(size[0] * size[1], self._threads, deadline, known)
+        self._give_way()
         return Render(request, composed, geometry, pace, self._pool, Start(
             before, what.edits, memory, coarse, first, edges, soon, goes_on, self._threads))
 
@@ -174,7 +176,9 @@ class Renderer:
             margin = MARGIN * np.abs(corners).max(axis=(1, 2), initial=0)[:, None]
             grown = np.concatenate([corners[:, 0] - margin, corners[:, 1] + margin], axis=1) if len(corners) else NO_BOXES
             through = any(old.leaves[index].visible and old.leaves[index].material.transmission > 0 for index in what.leaves)
-            memory.renumber(renumbering(old, geometry, what.leaves, UNKNOWN), through, grown)
+            number = renumbering(old, geometry, what.leaves, UNKNOWN)
+            self._give_way()
+            memory.renumber(number, through, grown)
         if what.extent("onward") == ANEW:
             memory.forget_onward()
         if what.extent("shadows") == ANEW:

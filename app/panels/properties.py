@@ -1,5 +1,4 @@
 """The property editor: forms made from the fields of whatever is selected."""
-import functools
 import time
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
@@ -8,7 +7,7 @@ import msgspec
 from PySide6.QtCore import Qt, QTimer, Slot
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QMenu, QToolButton, QVBoxLayout, QWidget
 
-from app.dismantle import dismantle
+from app.dismantle import Dismantler
 from app.editors import FlagEdit
 from app.forms import Form, RecordForm, Section
 from app.icons import icon
@@ -24,7 +23,6 @@ NEW_TRANSFORMS = (Translate((0, 0, 0)), Rotate((0, 1, 0), 0), Scale((1, 1, 1)), 
 INHERITED, OWN = "inherited", "own"
 SLICE = 0.0005      # s of building at a time and the row after: of a node's forms, which take 20 to 40 ms in all, some 3 ms in one go
 KEPT = 8            # bodies of forms that are kept, 1 to 5 MiB each: to build one again takes 20 to 40 ms, to show it 1
-APART = 20          # ms between two forms of a body that is taken down: all together they take 10 ms
 
 
 class Body(QWidget):
@@ -81,6 +79,7 @@ class PropertiesPanel(Panel):
         self._theme: Theme = DARK
         self._place: Place | None = None            # what the forms show
         self._bodies: OrderedDict[tuple, Body] = OrderedDict()      # by structure; the last one is seen
+        self._dismantler = Dismantler(self)
         self._soon = QTimer(self, interval=0)
         self._soon.timeout.connect(self._build_on)
         self.column.addStretch(1)
@@ -144,8 +143,8 @@ class PropertiesPanel(Panel):
         _, body = self._bodies.popitem(last=False)
         self.column.removeWidget(body)
         body.hide()
-        for i, part in enumerate((*body.forms.values(), body)):
-            QTimer.singleShot(i * APART, self, functools.partial(dismantle, part))
+        forms = body.forms.values()
+        self._dismantler.take([*(editor for form in forms for editor in form.editors.values()), *forms, body])
 
     def _structure(self, record: Record | None) -> tuple:
         """What decides which editors there are."""
