@@ -117,6 +117,12 @@ def packed(leaf: Leaf, dtype=np.float64) -> Packed:
         raise FieldError("transforms that together are invertible", leaf.matrix.tolist(), place(leaf)) from error
 
 
+def packed_in(geometry: Geometry, index: int) -> Packed:
+    """What a leaf was packed to; if that was not kept, it is packed once more."""
+    kept = next((group.packs[index] for group in geometry.groups if index in group.packs), None)
+    return packed(geometry.leaves[index], geometry.dtype) if kept is None else kept
+
+
 def place(leaf: Leaf) -> str:
     """Where a leaf stands, as error messages say it."""
     return "scene" + "".join(f"[{i}]" for i in leaf.path)

@@ -21,7 +21,7 @@ except ImportError:     # Windows
 
 from rtcore.bounds import packed_bounds
 from rtcore.edits import ANEW, KEPT, TOUCHED, Change, casting, change
-from rtcore.flatten import DTYPES, Geometry, flatten, packed, renumbering
+from rtcore.flatten import DTYPES, Geometry, flatten, packed_in, renumbering
 from rtcore.keep import Memory
 from rtcore.levels import NO_BOXES, UNKNOWN
 from rtcore.pace import Pace
@@ -168,8 +168,7 @@ class Renderer:
         """What was kept of the picture before, as far as it still holds."""
         memory, old = before.memory, before.tracer.geometry
         if what.extent("hits") == TOUCHED:
-            came = [geometry.leaves[index] for index in what.leaves if geometry.leaves[index].visible]
-            boxes = [packed_bounds(packed(leaf, geometry.dtype)) for leaf in came]
+            boxes = [packed_bounds(packed_in(geometry, index)) for index in what.leaves if geometry.leaves[index].visible]
             if None in boxes:       # it has no end, or no extent
                 return Memory()
             corners = np.array(boxes, np.float64).reshape(-1, 2, 3)
