@@ -207,7 +207,7 @@ class Query:
 
     def take(self, a: int, b: int, rays: Rays) -> np.ndarray:
         """Let `rays` be rays a .. b-1; returns what their t is to be multiplied with."""
-        stretch = np.empty(b - a)
+        stretch = np.empty(padded(b - a))
         with np.errstate(over="ignore"):
             points = [np.ascontiguousarray(array[a:b], self.geometry.dtype) for array in (self.origins, self.directions)]
         limits = [bound if len(bound) == 1 else np.ascontiguousarray(bound[a:b]) for bound in (self.t_min, self.t_max)]

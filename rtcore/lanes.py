@@ -89,7 +89,7 @@ def llvm_math(b, name, *args):
     """An LLVM math intrinsic on scalars or vectors."""
     t = args[0].type
     scalar = t.element if isinstance(t, ir.VectorType) else t
-    suffix = ("v8" if isinstance(t, ir.VectorType) else "") + ("f32" if isinstance(scalar, ir.FloatType) else "f64")
+    suffix = (f"v{t.count}" if isinstance(t, ir.VectorType) else "") + ("f32" if isinstance(scalar, ir.FloatType) else "f64")
     function = cgutils.get_or_insert_function(b.module, ir.FunctionType(t, [t] * len(args)), f"llvm.{name}.{suffix}")
     return b.call(function, args)
 
@@ -99,7 +99,7 @@ def _parts(ctx, b, t, value):
     return v.x, v.y, v.z
 
 
-def _vec3(ctx, b, t, parts):
+def vec3_of(ctx, b, t, parts):
     v = cgutils.create_struct_proxy(t)(ctx, b)
     v.x, v.y, v.z = parts
     return v._getvalue()
@@ -143,7 +143,7 @@ VECTORS = tuple(Vec3(part) for part in (F32, F64, types.float64))
 for _op, _name in ARITHMETIC[:2]:
     def _lower(ctx, b, sig, args, _name=_name):
         t = sig.return_type
-        return _vec3(ctx, b, t, [getattr(b, _name)(p, q) for p, q in zip(_parts(ctx, b, t, args[0]), _parts(ctx, b, t, args[1]))])
+        return vec3_of(ctx, b, t, [getattr(b, _name)(p, q) for p, q in zip(_parts(ctx, b, t, args[0]), _parts(ctx, b, t, args[1]))])
     _operator(_op, [signature(v, v, v) for v in VECTORS], _lower)
 
 
@@ -151,12 +151,12 @@ def _scale(ctx, b, sig, args):
     t = sig.return_type
     at = 0 if sig.args[0] == t else 1
     factor = _as(ctx, b, args[1 - at], sig.args[1 - at], t.part)
-    return _vec3(ctx, b, t, [b.fmul(p, factor) for p in _parts(ctx, b, t, args[at])])
+    return vec3_of(ctx, b, t, [b.fmul(p, factor) for p in _parts(ctx, b, t, args[at])])
 
 
 _operator(operator.mul, [signature(v, *pair) for v in VECTORS for n in {v.part, *NUMBERS} for pair in ((v, n), (n, v))], _scale)
 _operator(operator.neg, [signature(v, v) for v in VECTORS],
-          lambda ctx, b, sig, args: _vec3(ctx, b, sig.args[0], [b.fneg(p) for p in _parts(ctx, b, sig.args[0], args[0])]))
+          lambda ctx, b, sig, args: vec3_of(ctx, b, sig.args[0], [b.fneg(p) for p in _parts(ctx, b, sig.args[0], args[0])]))
 
 
 # --- functions on lanes ---
@@ -193,7 +193,7 @@ def select(tc, mask, x, y):
 
     def gen(ctx, b, sig, a):
         if isinstance(want, Vec3):
-            return _vec3(ctx, b, want, [b.select(a[0], p, q) for p, q in zip(_parts(ctx, b, want, a[1]), _parts(ctx, b, want, a[2]))])
+            return vec3_of(ctx, b, want, [b.select(a[0], p, q) for p, q in zip(_parts(ctx, b, want, a[1]), _parts(ctx, b, want, a[2]))])
         return b.select(a[0], _as(ctx, b, a[1], x, want), _as(ctx, b, a[2], y, want))
     return want(mask, x, y), gen
 
@@ -258,7 +258,7 @@ def wide(tc, x):
     def gen(ctx, b, sig, a):
         to = ir.VectorType(ir.DoubleType(), LANES)
         if isinstance(x, Vec3):
-            return _vec3(ctx, b, Vec3(F64), [p if x.part == F64 else b.fpext(p, to) for p in _parts(ctx, b, x, a[0])])
+            return vec3_of(ctx, b, Vec3(F64), [p if x.part == F64 else b.fpext(p, to) for p in _parts(ctx, b, x, a[0])])
         return a[0] if x == F64 else b.fpext(a[0], to)
     return (Vec3(F64) if isinstance(x, Vec3) else F64)(x), gen
 
@@ -275,7 +275,7 @@ def rounded(tc, x, like):
 def vec3(tc, x, y, z):
     """A Vec3 of three Lanes, or of three numbers as float64."""
     t = Vec3(x if isinstance(x, Lanes) else types.float64)
-    return t(x, y, z), lambda ctx, b, sig, a: _vec3(ctx, b, t, [_as(ctx, b, v, have, t.part) for v, have in zip(a, sig.args)])
+    return t(x, y, z), lambda ctx, b, sig, a: vec3_of(ctx, b, t, [_as(ctx, b, v, have, t.part) for v, have in zip(a, sig.args)])
 
 
 @intrinsic
@@ -290,7 +290,7 @@ def cross(tc, p, q):
     def gen(ctx, b, sig, a):
         u, v = _parts(ctx, b, p, a[0]), _parts(ctx, b, q, a[1])
         turns = ((1, 2), (2, 0), (0, 1))
-        return _vec3(ctx, b, p, [llvm_math(b, "fma", u[j], v[k], b.fneg(b.fmul(u[k], v[j]))) for j, k in turns])
+        return vec3_of(ctx, b, p, [llvm_math(b, "fma", u[j], v[k], b.fneg(b.fmul(u[k], v[j]))) for j, k in turns])
     return p(p, q), gen
 
 
@@ -298,7 +298,7 @@ def cross(tc, p, q):
 def along(tc, p, t, d):
     """p + t·d, each part fused. t: the vectors' part type."""
     def gen(ctx, b, sig, a):
-        return _vec3(ctx, b, p, [llvm_math(b, "fma", a[1], v, u) for u, v in zip(_parts(ctx, b, p, a[0]), _parts(ctx, b, d, a[2]))])
+        return vec3_of(ctx, b, p, [llvm_math(b, "fma", a[1], v, u) for u, v in zip(_parts(ctx, b, p, a[0]), _parts(ctx, b, d, a[2]))])
     return p(p, t, d), gen
 
 
@@ -329,7 +329,7 @@ def load3(tc, array, row, i):
 
     def gen(ctx, b, sig, a):
         rows = [b.add(a[1], ir.Constant(a[1].type, k)) for k in range(3)]
-        return _vec3(ctx, b, Vec3(v), [b.load(place_of(ctx, b, sig, (a[0], r, a[2]), REAL[v.elem], LANES), align=4) for r in rows])
+        return vec3_of(ctx, b, Vec3(v), [b.load(place_of(ctx, b, sig, (a[0], r, a[2]), REAL[v.elem], LANES), align=4) for r in rows])
     return Vec3(v)(array, types.intp, types.intp), gen
 
 
@@ -340,7 +340,7 @@ def splat3(tc, array, p, k):
 
     def gen(ctx, b, sig, a):
         start = place_of(ctx, b, sig, a, REAL[v.elem], 1)
-        return _vec3(ctx, b, Vec3(v), [splatted(b, b.load(b.gep(start, [I32(j)]))) for j in range(3)])
+        return vec3_of(ctx, b, Vec3(v), [splatted(b, b.load(b.gep(start, [I32(j)]))) for j in range(3)])
     return Vec3(v)(array, types.intp, types.intp), gen
 
 

@@ -3,10 +3,11 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from rtcore.lanes import F32, I32, LANES, LANES_OF, REAL, place_of, splatted
+from rtcore.lanes import F32, I32, LANES, LANES_OF, REAL, Vec3, place_of, splatted, vec3_of
 
 WHOLE = ir.VectorType(I32, LANES)
 COUNTING = ir.Constant(WHOLE, list(range(LANES)))
+TWICE = ir.Constant(ir.VectorType(I32, 2 * LANES), list(range(2 * LANES)))     # one vector after the other, as one
 
 
 @intrinsic
@@ -127,12 +128,27 @@ def add_one(tc, array, i):
     return types.void(array, types.intp), gen
 
 
+@intrinsic
+def load_triples(tc, array, i):
+    """Vec3 of x, y, z = array[i + k] in lane k; array (n, 3), C-contiguous."""
+    v = LANES_OF[array.dtype]
+
+    def gen(ctx, b, sig, a):
+        start = b.gep(ctx.make_array(array)(ctx, b, a[0]).data, [b.mul(a[1], ir.IntType(64)(3))])
+        places = [b.bitcast(b.gep(start, [I32(LANES * k)]), ir.VectorType(REAL[v.elem], LANES).as_pointer()) for k in range(3)]
+        eight = [b.load(place, align=4) for place in places]
+        # of 24 at once, LLVM makes 24 single ones
+        both, last = (b.shuffle_vector(x, y, TWICE) for x, y in (eight[:2], eight[2:] * 2))
+        parts = [b.shuffle_vector(both, last, ir.Constant(WHOLE, list(range(part, 3 * LANES, 3)))) for part in range(3)]
+        return vec3_of(ctx, b, Vec3(v), parts)
+    return Vec3(v)(array, types.intp), gen
+
+
 def _triples(add):
     def make(tc, array, i, x, y, z):
         def gen(ctx, b, sig, a):
             # the numbers in the order of memory: x0 y0 z0 x1 ...
-            both = b.shuffle_vector(a[2], a[3], ir.Constant(ir.VectorType(I32, 2 * LANES), list(range(2 * LANES))))
-            last = b.shuffle_vector(a[4], a[4], ir.Constant(ir.VectorType(I32, 2 * LANES), list(range(2 * LANES))))
+            both, last = b.shuffle_vector(a[2], a[3], TWICE), b.shuffle_vector(a[4], a[4], TWICE)
             for part in range(3):
                 order = [(LANES * channel if channel < 2 else 2 * LANES) + k
                          for k, channel in (divmod(LANES * part + j, 3) for j in range(LANES))]

@@ -118,6 +118,25 @@ def test_node_counts_leaves_hidden_and_repeated_ones_too():
     assert (rtcore.intersect(scene, [(0, 0, 2)], [(1, 0, 0)]).t == np.inf).all()     # the hidden one
 
 
+@pytest.mark.parametrize("n", [0, 1, 7, 8, 9, 16, 21])
+@pytest.mark.parametrize("precision", ["f32", "f64"])
+def test_any_number_of_rays_each_with_its_own_limits(n, precision):
+    rng = np.random.default_rng(n)
+    o, d = rng.normal(size=(n, 3)) * 3, rng.normal(size=(n, 3)) * 10.0 ** rng.integers(-6, 6, (n, 1))
+    t_min, t_max = rng.uniform(0, 2, n), rng.uniform(2, 5, n)
+    scale = 1 / np.linalg.norm(d, axis=1)
+    all_ = rtcore.intersect(BALL, o, d, t_min * scale, t_max * scale, precision)
+    alone = [rtcore.intersect(BALL, o[i:i + 1], d[i:i + 1], t_min[i] * scale[i], t_max[i] * scale[i], precision) for i in range(n)]
+    assert all_.t.tolist() == [one.t[0] for one in alone]
+    assert all_.node.tolist() == [one.node[0] for one in alone]
+    for k in range(n):
+        for bad, where in ((np.nan, d), (np.inf, o), (0, d)):
+            spoilt = where.copy()
+            spoilt[k] = bad
+            with pytest.raises(FieldError, match=rf"\[{k}\]"):
+                rtcore.intersect(BALL, spoilt if where is o else o, spoilt if where is d else d)
+
+
 def test_t_min_and_t_max():
     o, d = [(0, 0, -5)] * 4, [Z] * 4
     assert rtcore.intersect(BALL, o, d, t_min=[0, 4, 5, 6]).t.tolist() == [4, 6, 6, np.inf]      # t_min < t
