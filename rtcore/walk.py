@@ -19,7 +19,7 @@ from rtcore.jit import inline, inline_new
 from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, load3, narrow, select, size, splat, store, vec3, with_sign)
 from rtcore.pyramid import (ACTIVE, ALIVE, AXIS, BEAM_FROM, BEAM_TO, ENTER, FARTHEST, FROM, HIGHS, INVERSE, LEAVE, LOWS, MODE, OCTANT,
                             REACH, RUNNING, SIGN, SLOPE_FROM, SLOPE_TO, TOP, WAITING, WAY, bundle, common)
-from rtcore.turns import empty_sets, joined, keep, octets, prefetch_either, push
+from rtcore.turns import empty_sets, joined, keep, meeting, octets, prefetch_either, push
 from rtcore.wave import DX, OX, START, UNWANTED, T
 
 PACKET = 64
@@ -187,7 +187,7 @@ def next_leaf(walk, tree, table):
     table: of the primitives, a `kind.Table`, to be fetched ahead."""
     mode = walk.state[MODE]
     if mode == BEAM:
-        return _next_of_packet(walk, tree)
+        return _next_of_packet(walk, tree, table)
     if mode == ALONE:
         walk.state[TOP] -= 1
         return -1 - np.int64(tree.link[LINK, 0]) if walk.state[TOP] == 0 else -1
@@ -301,7 +301,7 @@ def _next_of_some(walk, tree, table):
 
 
 @inline
-def _next_of_packet(walk, tree):
+def _next_of_packet(walk, tree, table):
     """All rays together: the next leaf that one of them meets. A box that is wider than the beam around them is taken to be met."""
     coarse, beam, stack, entry, mask, near, state = walk.coarse, walk.beam, walk.stack, walk.entry, walk.mask, walk.near, walk.state
     box, link = tree.box, tree.link
@@ -312,6 +312,9 @@ def _next_of_packet(walk, tree):
     while top > 0:
         top -= 1
         place, waiting, node = np.int64(stack[0, top]), mask[top], np.int64(0)
+        below = max(np.int64(stack[0, max(top - 1, 0)]), 0)
+        child = np.int64(link[((below >> 4) << 3) + LINK, (below >> 1) & 7])
+        prefetch_either(child >= 0, box, NODE * child, table.data, table.exact, leaf_first(-1 - child))
         if not entry[0, top] <= farthest:
             continue
         if place >= 0:
@@ -319,7 +322,7 @@ def _next_of_packet(walk, tree):
             row = (place >> 4) << 3
             node = np.int64(link[row + LINK, k])
             if node < 0 or place & 1 == 0:
-                waiting = _met_by(coarse, waiting, box, row, k)
+                waiting &= octets(meeting(coarse, box, row, k))
                 if waiting == 0:
                     continue
                 if node < 0:
@@ -351,22 +354,3 @@ def _next_of_packet(walk, tree):
             top += 1
     state[TOP] = 0
     return -1
-
-
-@inline
-def _met_by(coarse, alive, box, row, k):
-    """Of the vectors of rays `alive`, those with one that meets child k of the node whose boxes start at `row`."""
-    l0, l1, l2, h0, h1, h2 = box[row, k], box[row + 1, k], box[row + 2, k], box[row + 3, k], box[row + 4, k], box[row + 5, k]
-    active = 0
-    for g in range(GROUPS):
-        if (alive >> g) & 1 == 0:
-            continue
-        j = g * 8
-        ix, iy, iz = load(coarse, INVERSE, j), load(coarse, INVERSE + 1, j), load(coarse, INVERSE + 2, j)
-        x0, y0, z0 = fma(l0, ix, load(coarse, LOWS, j)), fma(l1, iy, load(coarse, LOWS + 1, j)), fma(l2, iz, load(coarse, LOWS + 2, j))
-        x1, y1, z1 = fma(h0, ix, load(coarse, HIGHS, j)), fma(h1, iy, load(coarse, HIGHS + 1, j)), fma(h2, iz, load(coarse, HIGHS + 2, j))
-        near = greatest(greatest(least(x0, x1), least(y0, y1)), greatest(least(z0, z1), np.float32(0)))
-        far = least(least(greatest(x0, x1), greatest(y0, y1)), least(greatest(z0, z1), load(coarse, REACH, j)))
-        if any_lane(near <= far):
-            active |= 1 << g
-    return active

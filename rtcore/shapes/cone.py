@@ -9,6 +9,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.across import lowest_bit
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.expansions import LONG, NOISE, clear, expand, put_products
@@ -291,29 +292,30 @@ def intersect(rays, n, tree, table, first, opacity):
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most, even, limit, caps, side = exact[q, MOST], exact[q, EVEN], exact[q, LIMIT], exact[q, CAPS], table.side[q]
-                for g in range(PACKET // 8):
-                    if (walk.state[ACTIVE] >> g) & 1:
-                        i = start + g * 8
-                        near = approach(rays.ray, i, exact, q, even)
-                        todo = may_meet(near) & alive(rays.ray, i)
-                        late = 0
-                        if any_lane(todo):
-                            t, found, unsure = _second.meet(rays.ray, i, exact, q, most, even, IN_SLAB, limit, todo, near, side, where)
-                            record(rays, i, first + q, t, found, opacity)
-                            late = bits(unsure)
-                        while late:
-                            _second.settle(rays, i + lowest(late), first + q, table, q, IN_SLAB, opacity)
-                            late &= late - 1
-                        for cap in range(2):
-                            if caps == cap + 1 or caps == 3:
-                                todo = near_cap(rays.ray, i, exact, q, even, near, cap - 0.5)
-                                if any_lane(todo):
-                                    t, found, unsure = meet_cap(rays.ray, i, exact, q, most, even, cap - 0.5, todo, near, side)
-                                    record(rays, i, first + q, t, found, opacity)
-                                    late = bits(unsure)
-                                while late:
-                                    settle_cap(rays, i + lowest(late), first + q, table, q, cap - 0.5, opacity)
-                                    late &= late - 1
+                active = walk.state[ACTIVE]
+                while active:
+                    i = start + 8 * lowest_bit(active)
+                    active &= active - 1
+                    near = approach(rays.ray, i, exact, q, even)
+                    todo = may_meet(near) & alive(rays.ray, i)
+                    late = 0
+                    if any_lane(todo):
+                        t, found, unsure = _second.meet(rays.ray, i, exact, q, most, even, IN_SLAB, limit, todo, near, side, where)
+                        record(rays, i, first + q, t, found, opacity)
+                        late = bits(unsure)
+                    while late:
+                        _second.settle(rays, i + lowest(late), first + q, table, q, IN_SLAB, opacity)
+                        late &= late - 1
+                    for cap in range(2):
+                        if caps == cap + 1 or caps == 3:
+                            todo = near_cap(rays.ray, i, exact, q, even, near, cap - 0.5)
+                            if any_lane(todo):
+                                t, found, unsure = meet_cap(rays.ray, i, exact, q, most, even, cap - 0.5, todo, near, side)
+                                record(rays, i, first + q, t, found, opacity)
+                                late = bits(unsure)
+                            while late:
+                                settle_cap(rays, i + lowest(late), first + q, table, q, cap - 0.5, opacity)
+                                late &= late - 1
             shrink(walk, rays, start)
             leaf = next_leaf(walk, tree, table)
 

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.across import lowest_bit
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vectors
@@ -147,24 +148,25 @@ def intersect(rays, n, tree, table, first, opacity):
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 drop, begins, count = int(table.data[q, DROP]), int(table.data[q, FIRST]), int(table.data[q, COUNT])
-                for g in range(PACKET // 8):
-                    if (walk.state[ACTIVE] >> g) & 1:
-                        i = start + g * 8
-                        a, b = (drop + 1) % 3, (drop + 2) % 3
-                        t, off, todo = approach(rays.ray, i, table.exact, q)
-                        if any_lane(todo):
-                            inside, near = in_outline(rays.ray, i, table.extra, begins, count, a, b, t, off)
-                            if any_lane(todo & near):
-                                closely = in_outline_closely(rays.ray, i, table.exact, q, table.extra, begins, count, a, b)
-                                inside = inside & ~near | closely & near
-                            todo = todo & inside
-                        if any_lane(todo):
-                            s, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
-                            record(rays, i, first + q, s, hit, opacity)
-                            late = bits(unsure)
-                            while late:
-                                settle(rays, i + lowest(late), first + q, table, q, opacity)
-                                late &= late - 1
+                active = walk.state[ACTIVE]
+                while active:
+                    i = start + 8 * lowest_bit(active)
+                    active &= active - 1
+                    a, b = (drop + 1) % 3, (drop + 2) % 3
+                    t, off, todo = approach(rays.ray, i, table.exact, q)
+                    if any_lane(todo):
+                        inside, near = in_outline(rays.ray, i, table.extra, begins, count, a, b, t, off)
+                        if any_lane(todo & near):
+                            closely = in_outline_closely(rays.ray, i, table.exact, q, table.extra, begins, count, a, b)
+                            inside = inside & ~near | closely & near
+                        todo = todo & inside
+                    if any_lane(todo):
+                        s, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
+                        record(rays, i, first + q, s, hit, opacity)
+                        late = bits(unsure)
+                        while late:
+                            settle(rays, i + lowest(late), first + q, table, q, opacity)
+                            late &= late - 1
             shrink(walk, rays, start)
             leaf = next_leaf(walk, tree, table)
 

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
+from rtcore.across import lowest_bit
 from rtcore.directions import normalized
 from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
@@ -137,9 +138,11 @@ def intersect(rays, n, tree, table, first, opacity):
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
-                for g in range(PACKET // 8):
-                    i = start + g * 8
-                    if (walk.state[ACTIVE] >> g) & 1 and (table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q)):
+                active = walk.state[ACTIVE]
+                while active:
+                    i = start + 8 * lowest_bit(active)
+                    active &= active - 1
+                    if table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q):
                         far, near = approach(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
@@ -230,9 +233,11 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
-                for g in range(PACKET // 8):
-                    i = start + g * 8
-                    if (walk.state[ACTIVE] >> g) & 1 and (table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q)):
+                active = walk.state[ACTIVE]
+                while active:
+                    i = start + 8 * lowest_bit(active)
+                    active &= active - 1
+                    if table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q):
                         far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):

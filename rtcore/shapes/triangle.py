@@ -138,7 +138,8 @@ def pack_triangles(corners: np.ndarray, normals: np.ndarray | None, matrix: np.n
 
 @inline
 def shear(rays, start, n, slant, axes):
-    """Per ray: the axis it runs along most, and the shear that brings it onto that axis."""
+    """Per ray: the axis it runs along most, and the shear that brings it onto that axis. Returns the axes of all of them, as bits."""
+    every = 0
     for g in range(min(PACKET, n - start + 7) // 8):
         d = load3(rays.ray, DX, start + g * 8)
         x, y, z = size(d.x), size(d.y), size(d.z)
@@ -150,19 +151,29 @@ def shear(rays, start, n, slant, axes):
         store(slant, 2, g * 8, inverse)
         store(slant, 3, g * 8, select(along_x, 0, select(along_y, 1, 2 + 0 * inverse)))
         axes[g] = (bits(along_x) != 0) * 1 + (bits(along_y) != 0) * 2 + (bits(along_x | along_y) != 255) * 4
+        every |= axes[g]
+    return every
 
 
 @inline
-def edges(ray, i, j, data, q, slant, axis):
-    """Of eight rays and triangle q: the three edge functions, and the corners' distances along `axis`. i: the rays' column in ray, j: in
-    the packet."""
+def corners(data, q, axis):
+    """The corners of triangle q, nine numbers: each the two coordinates that follow that along `axis`, then that one."""
+    kx, ky = (axis + 1) % 3, (axis + 2) % 3
+    return (data[q, kx], data[q, ky], data[q, axis], data[q, 3 + kx], data[q, 3 + ky], data[q, 3 + axis],
+            data[q, 6 + kx], data[q, 6 + ky], data[q, 6 + axis])
+
+
+@inline
+def edges(ray, i, j, three, slant, axis):
+    """Of eight rays and a triangle, its corners as `corners` gives them: the three edge functions, and the corners' distances along `axis`.
+    i: the rays' column in ray, j: in the packet."""
     kx, ky = (axis + 1) % 3, (axis + 2) % 3
     sx, sy = load(slant, 0, j), load(slant, 1, j)
     ox, oy, oz = load(ray, OX + kx, i), load(ray, OX + ky, i), load(ray, OX + axis, i)
-    az, bz, cz = data[q, axis] - oz, data[q, 3 + axis] - oz, data[q, 6 + axis] - oz
-    ax, ay = fma(-sx, az, data[q, kx] - ox), fma(-sy, az, data[q, ky] - oy)
-    bx, by = fma(-sx, bz, data[q, 3 + kx] - ox), fma(-sy, bz, data[q, 3 + ky] - oy)
-    cx, cy = fma(-sx, cz, data[q, 6 + kx] - ox), fma(-sy, cz, data[q, 6 + ky] - oy)
+    az, bz, cz = three[2] - oz, three[5] - oz, three[8] - oz
+    ax, ay = fma(-sx, az, three[0] - ox), fma(-sy, az, three[1] - oy)
+    bx, by = fma(-sx, bz, three[3] - ox), fma(-sy, bz, three[4] - oy)
+    cx, cy = fma(-sx, cz, three[6] - ox), fma(-sy, cz, three[7] - oy)
     # a difference of two rounded products never has the wrong sign, only 0: no ray falls between two triangles. Not to be fused.
     return cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax, az, bz, cz
 
@@ -206,27 +217,27 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, 2048)
         if walk.state[TOP] == 0:
             continue
-        shear(rays, start, n, slant, axes)
+        every = shear(rays, start, n, slant, axes)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             ray = only_ray(walk)
-            wanted = 7 if ray < 0 else 1 << int(slant[3, ray])
-            for q in range(leaf_first(leaf), leaf_end(leaf)):
-                active = walk.state[ACTIVE]
-                while active:
-                    g = lowest_bit(active)
-                    active &= active - 1
-                    i = start + g * 8
-                    seen = axes[g] & wanted
-                    while seen:
-                        axis = lowest_bit(seen)
-                        seen &= seen - 1
-                        u, v, w, az, bz, cz = edges(rays.ray, i, g * 8, table.data, q, slant, axis)
+            seen = every if ray < 0 else 1 << int(slant[3, ray])
+            while seen:
+                axis = lowest_bit(seen)
+                seen &= seen - 1
+                for q in range(leaf_first(leaf), leaf_end(leaf)):
+                    three, side = corners(table.data, q, axis), table.side[q]
+                    active = walk.state[ACTIVE]
+                    while active:
+                        g = lowest_bit(active)
+                        active &= active - 1
+                        i = start + g * 8
+                        u, v, w, az, bz, cz = edges(rays.ray, i, g * 8, three, slant, axis)
                         ok = ((u <= 0) & (v <= 0) & (w <= 0)) | ((u >= 0) & (v >= 0) & (w >= 0))
                         if axes[g] != 1 << axis:
                             ok = ok & (load(slant, 3, g * 8) == axis)
                         if any_lane(ok):
-                            det, inverse, side = u + v + w, load(slant, 2, g * 8), table.side[q]
+                            det, inverse = u + v + w, load(slant, 2, g * 8)
                             late = bits(ok & (size(det) < tiny))
                             if side & (FRONT | BACK):
                                 # a ray along -axis, inverse < 0, sees the front where det < 0
