@@ -79,7 +79,8 @@ def primary(camera: Camera, count: int) -> tuple[np.ndarray, np.ndarray]:
     eye, corner, right, down = camera.rays(side, side)
     y, x = (grid.reshape(side // TILE, TILE, side // TILE, TILE).swapaxes(1, 2).reshape(-1, 1) + 0.5 for grid in np.indices((side, side)))
     directions = corner + x * right + y * down
-    return np.broadcast_to(eye, directions.shape).astype(np.float32), directions.astype(np.float32)
+    # in rows, as callers have them: numpy keeps the order in which they were made
+    return np.tile(eye, (count, 1)).astype(np.float32), directions.astype(np.float32, order="C")
 
 
 def scattered(mesh: Triangles, count: int) -> tuple[np.ndarray, np.ndarray]:
