@@ -11,6 +11,7 @@ from app.theme import DARK, Theme
 from rtcore.account import Account, account, loaded_kernels, plural, sentences
 
 OFTEN = 250     # ms between two updates while a picture refines itself
+SOON = 20       # ms from the panel's being shown to its update: the window lays itself out and paints first, some 9 ms
 TOLD = 2        # sentences at the top; the rest are the lists below them
 
 
@@ -114,7 +115,7 @@ class PlanPanel(Panel):
         self.column.addWidget(self.saying)
         self.column.addWidget(self.columns)
         self.column.addStretch(1)
-        self._timer = QTimer(self, singleShot=True, interval=OFTEN)
+        self._timer = QTimer(self, singleShot=True)
         self._timer.timeout.connect(self.refresh)
         session.frame_changed.connect(self._moved)
 
@@ -129,12 +130,12 @@ class PlanPanel(Panel):
 
     def showEvent(self, event):
         super().showEvent(event)
-        self.refresh()
+        self._timer.start(SOON)
 
     @Slot()
     def _moved(self):
         if self.isVisible() and not self._timer.isActive():
-            self._timer.start()
+            self._timer.start(OFTEN)
 
     @Slot()
     def refresh(self):
