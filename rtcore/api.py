@@ -117,7 +117,7 @@ def render(scene: Scene, size: tuple[int, int] = (640, 480), spp: int = 1, **set
     chosen = Settings(size=size, samples=spp, **settings)
     renderer = Renderer()
     try:
-        for frame in renderer.frames(RenderRequest(scene, framed(scene, size[0] / size[1]), chosen), coarse=False):
+        for frame in renderer.frames(RenderRequest(scene, framed(scene, size[0] / size[1]), chosen, hits=False), coarse=False):
             last = frame
         return Image(last.pixels, renderer.stats())
     finally:

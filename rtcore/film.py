@@ -29,6 +29,7 @@ class Film(NamedTuple):
     split: np.ndarray       # float32 (h·w, 3): sum of the first replicate's samples less that of the second's
     square: np.ndarray      # float64 (h·w): sum of the samples' squares, the mean over the channels
     count: np.ndarray       # int32 (h·w): how many
+    # of length 0 where nobody asks what is seen, only for the picture:
     prim: np.ndarray        # int32 (h·w): the primitive that sample 0 hit first, -1 none
     distance: np.ndarray    # float32 (h·w): how far away, inf none
     normal: np.ndarray      # float32 (h·w, 3): shading normal there, 0 none
@@ -39,13 +40,13 @@ class Film(NamedTuple):
     plain: np.ndarray
 
 
-def new_film(width: int, height: int, samples: int = 2, lit: bool = False, signed: bool = False) -> Film:
-    """An empty film for so many samples per pixel. lit: whether it is to note which lights reach what is hit first; signed: whether samples
-    have signs."""
+def new_film(width: int, height: int, samples: int = 2, hits: bool = True, lit: bool = False, signed: bool = False) -> Film:
+    """An empty film for so many samples per pixel. hits: whether it is to note what is hit first, lit: which lights reach that; signed:
+    whether samples have signs."""
     n = width * height
-    m = n if samples > 1 else 0
-    film = Film(*carved(((n, 3), np.float64), ((m, 3), np.float32), ((m,), np.float64), ((n,), np.int32), ((n,), np.int32),
-                        ((n,), np.float32), ((n, 3), np.float32), ((n,), np.uint8), ((n if lit else 0,), np.float32),
+    m, p = n if samples > 1 else 0, n if hits else 0
+    film = Film(*carved(((n, 3), np.float64), ((m, 3), np.float32), ((m,), np.float64), ((n,), np.int32), ((p,), np.int32),
+                        ((p,), np.float32), ((p, 3), np.float32), ((p,), np.uint8), ((n if lit else 0,), np.float32),
                         ((n if signed else 0, 5), np.float64)))
     # the system hands the memory out now, not in the midst of tracing, a tenth of whose time that took
     for array, value in zip(film, (0, 0, 0, 0, -1, np.inf, 0, 0, 0, 0)):
@@ -53,9 +54,11 @@ def new_film(width: int, height: int, samples: int = 2, lit: bool = False, signe
     return film
 
 
-def suits(film: Film, samples: int, lit: bool, signed: bool) -> bool:
-    """Whether a film of the right size has the arrays for so many samples per pixel, for signs or none, and those for lights if wanted."""
-    return (len(film.square) > 0) == (samples > 1) and (len(film.plain) > 0) == signed and (len(film.lit) > 0 or not lit)
+def suits(film: Film, samples: int, hits: bool, lit: bool, signed: bool) -> bool:
+    """Whether a film of the right size has the arrays for so many samples per pixel, for signs or none, and those for first hits and for
+    lights if wanted."""
+    return ((len(film.square) > 0) == (samples > 1) and (len(film.plain) > 0) == signed and (len(film.prim) > 0 or not hits)
+            and (len(film.lit) > 0 or not lit))
 
 
 def clear(film: Film) -> None:
@@ -203,8 +206,9 @@ def _commit_one(film, p, r, g, b):
 
 @kernel
 def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
-    """Rows first .. last - 1 of the mean picture, pixels (h, w, 3) float32, and which leaf each pixel shows and how far away; leaf: that of
-    each primitive. A pixel without a sample shows that of the lattice before it."""
+    """Rows first .. last - 1 of the mean picture, pixels (h, w, 3) float32, and, unless they have length 0, which leaf each pixel shows and
+    how far away; leaf: that of each primitive. A pixel without a sample shows that of the lattice before it."""
+    told = node.shape[0] > 0
     for y in range(first, last):
         x = 0
         while x < width:
@@ -213,9 +217,10 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
             if c > 0 and x + LANES <= width and bits(among(film.count, p, c, c + 1)) == 255:
                 for k in range(0, 3 * LANES, LANES):
                     store_flat(pixels, 3 * p + k, narrow(load_flat(film.total, 3 * p + k) / np.float64(c)))
-                store_flat(distance, p, load1(film.distance, p))
-                for k in range(LANES):
-                    node[y, x + k] = leaf[film.prim[p + k]] if film.prim[p + k] >= 0 else -1
+                if told:
+                    store_flat(distance, p, load1(film.distance, p))
+                    for k in range(LANES):
+                        node[y, x + k] = leaf[film.prim[p + k]] if film.prim[p + k] >= 0 else -1
                 x += LANES
                 continue
             while film.count[p] == 0 and step < spacing:
@@ -224,8 +229,9 @@ def develop(film, leaf, width, first, last, spacing, pixels, node, distance):
             c = film.count[p]
             for k in range(3):
                 pixels[y, x, k] = film.total[p, k] / c if c > 0 else 0.0
-            node[y, x] = leaf[film.prim[p]] if c > 0 and film.prim[p] >= 0 else -1
-            distance[y, x] = film.distance[p] if c > 0 else np.inf
+            if told:
+                node[y, x] = leaf[film.prim[p]] if c > 0 and film.prim[p] >= 0 else -1
+                distance[y, x] = film.distance[p] if c > 0 else np.inf
             x += 1
 
 

@@ -48,6 +48,7 @@ class RenderRequest(NamedTuple):
     scene: Scene
     camera: Camera
     settings: Settings
+    hits: bool = True       # whether frames tell what each pixel shows; a picture alone is there a little sooner
 
 
 class Frame(NamedTuple):
@@ -58,8 +59,8 @@ class Frame(NamedTuple):
     spacing: int            # of the lattice: 16, 8, 4, 2; 1 from then on
     samples: int            # of every pixel, complete; 0 while the lattice is coarse
     pixels: np.ndarray      # float32 (h, w, 3), linear; the frame's own
-    node: np.ndarray        # int32 (h, w): leaf first hit, -1 none
-    distance: np.ndarray    # float32 (h, w): from the eye, inf none
+    node: np.ndarray | None         # int32 (h, w): leaf first hit, -1 none; None if that was not asked for
+    distance: np.ndarray | None     # float32 (h, w): from the eye, inf none
     rays: dict[str, int]
     elapsed: float          # seconds of tracing
     done: bool
@@ -89,7 +90,7 @@ class Render:
     """One request under way: its film, its scratch arrays, how far it is."""
 
     def __init__(self, request: RenderRequest, composed: Plan, geometry: Geometry, pace: Pace, pool: ThreadPoolExecutor, start: Start):
-        scene, camera, self.settings = self.request = request
+        scene, camera, self.settings, hits = self.request = request
         before, self.edits, self.memory, self.coarse, first, self.edges, self.soon, goes_on, threads = start
         self.plan, self.pace, self.pool = composed, pace, pool
         self.with_light = VIEW[self.settings.view].needs_light
@@ -103,11 +104,12 @@ class Render:
         lens = camera.lens() if self.plan.lens else None
         # which lights reach what is seen costs little to note and is not to be had later: the window may ask at any time
         lit = self.coarse or VIEW[self.settings.view].needs_lit or (before is not None and len(before.film.lit) > 0)
-        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog, lit)
+        hits = hits or VIEW[self.settings.view].needs_hits or (before is not None and len(before.film.prim) > 0)
+        self.tracer = Tracer(geometry, self.plan, self.settings, view, lens, camera.up, scene.background, scene.fog, hits, lit)
         self.gain = self.tracer.filter.gain if self.tracer.filter else 1.0
         signed = self.gain < 1
-        reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, lit, signed)
-        self.film = before.film if reused else films.new_film(width, height, self.plan.samples, lit, signed)
+        reused = before is not None and before.settings.size == size and films.suits(before.film, self.plan.samples, hits, lit, signed)
+        self.film = before.film if reused else films.new_film(width, height, self.plan.samples, hits, lit, signed)
         if not reused and self.memory is not None:
             self.memory.forget_film()
         self.fresh = not goes_on        # the film was empty
@@ -139,7 +141,7 @@ class Render:
     def answers(self, request: RenderRequest, keep: bool) -> bool:
         """Whether what is under way is what another request wants too, at most seen differently. The very same request is answered by
         going on with it, and once it is done, by doing it again, unless it is kept."""
-        scene, camera, settings = request
+        scene, camera, settings, hits = request
         mine = self.request.settings
         if scene is not self.request.scene or camera != self.request.camera:
             return False
@@ -148,6 +150,8 @@ class Render:
         if VIEW[settings.view].needs_light and not self.with_light:
             return False
         if VIEW[settings.view].needs_lit and not len(self.film.lit):
+            return False
+        if (hits or VIEW[settings.view].needs_hits) and not len(self.film.prim):
             return False
         return keep or not self.done or settings.view != self.settings.view
 
@@ -165,7 +169,8 @@ class Render:
             return False
         most = min(adaptive.FIRST, composed.samples) if self.adaptive or request.settings.adaptive else composed.samples
         lit, signed = len(self.film.lit) > 0, len(self.film.plain) > 0
-        return films.suits(self.film, composed.samples, lit, signed) and int(self.film.count.max()) <= most
+        hits = request.hits or VIEW[request.settings.view].needs_hits
+        return films.suits(self.film, composed.samples, hits, lit, signed) and int(self.film.count.max()) <= most
 
     def trace(self, cancelled: Callable[[], bool]) -> Iterator[None]:
         """Trace what is missing of the current pass on the pool; yields now and then while it runs. Closing the iterator, or an error in
@@ -334,7 +339,8 @@ class Render:
         began, film, (width, height) = time.perf_counter(), self.film, self.settings.size
         # not from `memory.carved`: frames come and go, and what the last ones left is there without being cleared
         pixels = np.empty((height, width, 3), np.float32)
-        node, distance = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+        told = (height, width) if len(film.prim) else (0, 0)
+        node, distance = np.empty(told, np.int32), np.empty(told, np.float32)
         bands = [0, height]
         if not self.tracing:    # else the pool's threads have their hands full
             bands = np.linspace(0, height, len(self.scratches) + 1).astype(int).tolist()
@@ -355,5 +361,6 @@ class Render:
             coordinates=lambda: spread(self.recast.coordinates(film, share)), tests=lambda: spread(self.recast.tests(film, share))))
         self.pace.frame = 0.7 * self.pace.frame + 0.3 * SHOWN * (time.perf_counter() - began)
         mean = float(film.count.mean()) if self.tracing else self.spent
-        return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, node, distance,
-                     self.rays(), self.elapsed, done, self.plan, self.seconds(), mean, self.error(), self.converged, self.held())
+        seen = (node, distance) if len(film.prim) else (None, None)
+        return Frame(self.number, len(self.schedule), self.schedule[self.number].spacing, self.samples, shown, *seen, self.rays(),
+                     self.elapsed, done, self.plan, self.seconds(), mean, self.error(), self.converged, self.held())

@@ -189,7 +189,7 @@ class Renderer:
     def _composed(self, request: RenderRequest) -> Plan:
         """The plan, made anew only for another scene, other settings or a lens put on or off, with all its kernels at hand: from the cache,
         or compiled."""
-        scene, camera, settings = request
+        scene, camera, settings, _ = request
         lens = camera.aperture > 0
         if self._planned is None or self._planned[0] is not scene or self._planned[1:3] != (settings, lens):
             self._planned = scene, settings, lens, plan(scene, settings, camera=camera)
@@ -214,7 +214,8 @@ class Renderer:
         samples = {"least": int(count.min()), "mean": round(float(count.mean()), 3), "most": int(count.max())}
         slow, uncertified = (int(x) for x in sum(scratch.tally[COUNTED] for scratch in render.scratches))
         traced = sum(count for name, count in render.rays().items() if not name.endswith("hits"))
-        left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else [])]
+        left_out = [*render.plan.left_out, *([("degenerate triangles", f"{render.dropped} without area")] if render.dropped else []),
+                    *([("first hits on the film", "only the picture was asked for")] if not len(render.film.prim) else [])]
         return {"size": list(settings.size), "samples_per_pixel": samples["mean" if render.adaptive else "least"], "samples": samples,
                 "precision": settings.precision,
                 "threads": self._threads, "rays": render.rays(),

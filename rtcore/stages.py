@@ -291,7 +291,7 @@ def advance(program, state, film, todo):
             if depth == 1:
                 for i in range(n):
                     counts[PRIMARY_HITS] += rays.prim[i] >= 0
-                if s[NOTING] != 0:
+                if s[NOTING] != 0 and stages[NOTES] != 0:
                     call(stages[NOTES], (film, wave, n, state.target))
                 since = _lap(spent, FILM, since)
                 if s[NOTING] != 0 and stages[DOUBTS] != 0:

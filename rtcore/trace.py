@@ -39,7 +39,7 @@ class Tracer:
     """Traces tiles of one scene from one camera. Holds nothing that changes but the kernels it has met, so threads may share it."""
 
     def __init__(self, geometry: Geometry, plan: Plan, settings: Settings, view: np.ndarray, lens: np.ndarray | None, up,
-                 background: Background, fog: Fog | None, lit: bool):
+                 background: Background, fog: Fog | None, hits: bool, lit: bool):
         self.geometry, self.plan, self.settings, self.view, self.lens = geometry, plan, settings, view, lens
         self.code = CODE[geometry.dtype]
         self.look = shading.make_look(geometry.leaves, geometry.leaf, plan.ambient, background, up)
@@ -49,11 +49,11 @@ class Tracer:
         self.lasting = [(group.first, group.first + len(group.owner)) for group in geometry.groups if group.kind.lasting]
         self.lasting_kinds = [group.kind.lasting for group in geometry.groups]
         self._held: list = []       # arrays of which the program has only addresses
-        self.program = self._programmed(fog, lit)
+        self.program = self._programmed(fog, hits, lit)
         self.laps = self._named()
 
-    def _programmed(self, fog: Fog | None, lit: bool) -> Program:
-        """The stages that the plan keeps; lit: whether the film notes which lights reach the first hits."""
+    def _programmed(self, fog: Fog | None, hits: bool, lit: bool) -> Program:
+        """The stages that the plan keeps; hits: whether the film notes the first hits; lit: which lights reach them."""
         plan, groups, dtype = self.plan, self.geometry.groups, self.geometry.dtype
         like = no_primitives(dtype)
         kinds, primitives = np.zeros((len(groups), 3), np.int64), rows_for(len(groups), like)
@@ -73,7 +73,7 @@ class Tracer:
         bright, signed = VIEW[settings.view].needs_light, self.filter is not None and self.filter.gain < 1
         listed = settings.adaptive and plan.samples > EVENLY
         wanted = [(stages.SENDS, cast, "sends", True), (stages.SENDS_LIST, cast_list, "sends list", listed),
-                  (stages.FINDS, find_kinds, "finds", len(groups) > 1), (stages.NOTES, films.note_first_hits, "notes", True),
+                  (stages.FINDS, find_kinds, "finds", len(groups) > 1), (stages.NOTES, films.note_first_hits, "notes", hits),
                   (stages.GLOWS, shading.glow, "glows", bright), (stages.GATHERS, shading.gather, "gathers", plan.lights),
                   (stages.NOTES_LIT, films.note_lit, "notes lit", lit and plan.lights),
                   (stages.DIMS, fogs.dim, "dims", plan.fog), (stages.DEPOSITS, films.deposit, "deposits", bright),
@@ -84,7 +84,7 @@ class Tracer:
         chosen[stages.SHADOWED], chosen[stages.ROUGH], chosen[stages.LASTS] = plan.shadows, plan.gloss, any(self.lasting_kinds)
         chosen[stages.SPREADS] = self.filter is not None or self.lens is not None
         chosen[stages.NUMBERED] = chosen[stages.SPREADS] or plan.gloss or any(isinstance(light, SAMPLED) for light in plan.lights)
-        chosen[stages.DOUBTS] = any(group.kind.doubtful or group.kind.textbook and plan.textbook for group in groups)
+        chosen[stages.DOUBTS] = hits and any(group.kind.doubtful or group.kind.textbook and plan.textbook for group in groups)
         ends = np.array([group.first + len(group.owner) for group in groups], np.int64)
         fogged = fogs.numbers(fog) if plan.fog else np.zeros(0)
         return Program(chosen, view, kinds, primitives, ends, lamps, numbers, fogged, self.look, like, no_lamp)

@@ -147,3 +147,33 @@ def test_a_picture_notes_lights_only_if_they_are_asked_for():
         *_, frame = renderer.frames(RenderRequest(MANY, CAMERA, settings), coarse=coarse)
         assert (len(renderer._render.film.lit) > 0) == noted and frame.done
     renderer.close()
+
+
+@pytest.mark.parametrize("view", [view.name for view in VIEWS])
+def test_a_picture_alone_is_the_same(renderer, view):
+    settings = Settings(size=SIZE, samples=2, view=view)
+    *_, whole = renderer.frames(RenderRequest(MANY, CAMERA, settings), coarse=False)
+    alone = Renderer()
+    *_, frame = alone.frames(RenderRequest(MANY, CAMERA, settings, hits=False), coarse=False)
+    assert np.array_equal(frame.pixels, whole.pixels) and frame.rays == whole.rays
+    left_out = {entry["stage"]: entry["why"] for entry in alone.stats()["left_out"]}
+    if view in ("beauty", "samples", "error"):
+        assert frame.node is None and frame.distance is None and left_out["first hits on the film"] == "only the picture was asked for"
+        assert frame.held["film"] < whole.held["film"]
+    else:       # it is drawn from them
+        assert np.array_equal(frame.node, whole.node) and "first hits on the film" not in left_out
+    alone.close()
+
+
+def test_after_a_picture_alone_first_hits_are_to_be_had():
+    renderer, settings = Renderer(), Settings(size=SIZE, samples=2)
+    *_, alone = renderer.frames(RenderRequest(MANY, CAMERA, settings, hits=False), coarse=False)
+    *_, more = renderer.frames(RenderRequest(MANY, CAMERA, settings), coarse=False)
+    assert alone.node is None and (more.node >= 0).any() and np.isfinite(more.distance[more.node >= 0]).all()
+    assert np.array_equal(more.pixels, alone.pixels)
+    *_, depth = renderer.frames(RenderRequest(MANY, CAMERA, Settings(size=SIZE, samples=2, view="depth"), hits=False), coarse=False)
+    fresh = Renderer()
+    *_, expected = fresh.frames(RenderRequest(MANY, CAMERA, Settings(size=SIZE, samples=2, view="depth")), coarse=False)
+    assert np.array_equal(depth.pixels, expected.pixels)
+    fresh.close()
+    renderer.close()

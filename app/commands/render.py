@@ -115,7 +115,7 @@ def trace(scene, camera, settings, interrupted):
     try:
         aim = f" of {settings.samples} samples" if settings.error is None else f" samples, until the error is {settings.error:g}"
         with Progress("rendering") as bar:
-            for frame in renderer.frames(RenderRequest(scene, camera, settings), interrupted, coarse=False):
+            for frame in renderer.frames(RenderRequest(scene, camera, settings, hits=False), interrupted, coarse=False):
                 used = time.monotonic() - start
                 if settings.seconds is not None:
                     bar.show(min(used / settings.seconds, 1.0), f"{frame.mean:.4g} samples", max(settings.seconds - used, 0.0))

@@ -86,7 +86,7 @@ def refer(renderer: Renderer, scene: Scene, camera: Camera, settings: Settings, 
         seed = (REFERENCE_SEED + part) ^ settings.seed
         chosen = msgspec.structs.replace(settings, samples=each, seed=seed, precision="f64", solver="certain", adaptive=False, seconds=None,
                                          error=None, view="beauty")
-        for frame in renderer.frames(RenderRequest(scene, camera, chosen), cancelled, coarse=False):    # noqa: B007 -- the last one
+        for frame in renderer.frames(RenderRequest(scene, camera, chosen, hits=False), cancelled, coarse=False):    # noqa: B007 -- the last one
             yield Step((part + renderer.progress) / PARTS, "reference")
         if cancelled():
             return
@@ -113,10 +113,10 @@ def run(scene: Scene, camera: Camera, settings: Settings, methods: Iterable[str]
                                              seconds=budget / RUNS, view="beauty")
             if number == 0:     # load kernels and arrays before the clock counts
                 short = msgspec.structs.replace(chosen, size=(16, 12), samples=16)
-                for _ in renderer.frames(RenderRequest(scene, camera, short), cancelled, coarse=False):
+                for _ in renderer.frames(RenderRequest(scene, camera, short, hits=False), cancelled, coarse=False):
                     pass
             rows: dict[int, Row] = {}       # by pass: a frame from within one gives way to that at its end
-            for frame in renderer.frames(RenderRequest(scene, camera, chosen), cancelled, coarse=False):
+            for frame in renderer.frames(RenderRequest(scene, camera, chosen, hits=False), cancelled, coarse=False):
                 yield Step(0.5 + (done + min(frame.elapsed / chosen.seconds, 1.0)) / len(jobs) / 2, name)
                 if (row := compare(name, number, frame, reference)) is not None:
                     if not reference.judges(row.rmse):

@@ -12,4 +12,5 @@ def draw(seen):
     return heat(np.where(np.isfinite(error), share, 0))
 
 
-ERROR = View("error", "the estimated error of each pixel, on a logarithmic scale", draw, needs_light=True, kernels=("adaptive",))
+ERROR = View("error", "the estimated error of each pixel, on a logarithmic scale", draw, needs_light=True, needs_hits=False,
+             kernels=("adaptive",))

@@ -10,4 +10,4 @@ def draw(seen):
     return heat((octaves - least + 1) / max(octaves.max() - least + 1, 6))
 
 
-SAMPLES = View("samples", "how many samples each pixel has got, brighter by the octave", draw, needs_light=True)
+SAMPLES = View("samples", "how many samples each pixel has got, brighter by the octave", draw, needs_light=True, needs_hits=False)

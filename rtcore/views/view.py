@@ -27,13 +27,14 @@ class Seen(NamedTuple):
 @dataclass(frozen=True)
 class View:
     """A name, a line of help, and `draw`, which makes a linear picture (h, w, 3) float32. One that needs no light is drawn from the
-    first hits alone, if nothing else was asked for. needs_lit: the film must have noted which lights reach the first hits. kernels: the
-    groups (`rtcore.warm`) that drawing it takes."""
+    first hits alone, if nothing else was asked for. needs_hits: the film must have noted the first hits; needs_lit: which lights reach
+    them. kernels: the groups (`rtcore.warm`) that drawing it takes."""
 
     name: str
     help: str
     draw: Callable[[Seen], np.ndarray]
     needs_light: bool = False
+    needs_hits: bool = True
     needs_lit: bool = False
     kernels: tuple[str, ...] = ()
 
