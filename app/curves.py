@@ -92,12 +92,13 @@ class Drawn:
         self.points = pg.ScatterPlotItem(size=style.letters * 0.4, brush=color, pen=None, antialias=True)
         self.name = write(plot, "", 0, 0, color, style, small=guide)
         self._items, self._now = (self.estimate, self.error, self.points, self.name), {}
-        for item in self._items[:3]:
+        self._empty = set(self._items[:3])      # not to be painted: pyqtgraph takes 0.3 ms for no points at all
+        for item in self._empty:
             plot.addItem(item, ignoreBounds=True)
 
     def show(self, on: bool):
         for item in self._items:
-            item.setVisible(on)
+            item.setVisible(on and item not in self._empty)
 
     def draw(self, item: pg.PlotCurveItem | pg.ScatterPlotItem, x, y):
         """Let an item go through points."""
@@ -105,6 +106,8 @@ class Drawn:
         if self._now.get(item) != points:
             self._now[item] = points
             item.setData(np.array(x, float), np.array(y, float))
+            (self._empty.discard if points[0] else self._empty.add)(item)
+            item.setVisible(bool(points[0]))
 
     def write(self, text: str, x: float, y: float):
         """Put the name at a place."""

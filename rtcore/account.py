@@ -1,14 +1,11 @@
 """What a render costs, and what it is spared: the plan's stages and kernels with their measured shares, the reasons for what was left
 out, the bytes held, and all of it in sentences.
 """
-import sys
 from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from numba.core.dispatcher import Dispatcher
-
-from rtcore.jit import Cache
+from rtcore.jit import KERNELS
 from rtcore.plan import Plan
 from rtcore.shapes import KIND_MODULES
 
@@ -108,9 +105,9 @@ def loaded_kernels() -> dict[str, str]:
     """Kernels that are in this process now, such as "shapes.sphere.intersect_spheres", and how they came: "loaded" from the cache or
     "compiled" here."""
     found = {}
-    for module in [module for name, module in sorted(sys.modules.items()) if name.startswith("rtcore.")]:
-        for value in vars(module).values():
-            if isinstance(value, Dispatcher) and isinstance(value._cache, Cache) and value.signatures:
-                name = f"{value.py_func.__module__.removeprefix('rtcore.')}.{value.py_func.__name__}"
-                found[name] = "compiled" if sum(value.stats.cache_misses.values()) else "loaded"
+    for made in tuple(KERNELS):     # another thread may import more of them meanwhile
+        module = made.py_func.__module__
+        if made.overloads and module.startswith("rtcore."):
+            found[f"{module.removeprefix('rtcore.')}.{made.py_func.__name__}"] = \
+                "compiled" if sum(made.stats.cache_misses.values()) else "loaded"
     return found

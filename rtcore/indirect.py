@@ -12,7 +12,7 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rtcore.jit import Cache, typed
+from rtcore.jit import kept, typed
 
 SIZE = 2        # of an array's words the one that tells how many elements it has
 
@@ -20,9 +20,7 @@ SIZE = 2        # of an array's words the one that tells how many elements it ha
 def caller(function):
     """As `jit.kernel`, for one that makes no arrays: no references are counted, which for a hundred arrays would take longer than what it
     does itself."""
-    made = njit(nogil=True, error_model="numpy", forceinline=False, _nrt=False)(function)
-    made._cache = Cache(function)
-    return made
+    return kept(njit(nogil=True, error_model="numpy", forceinline=False, _nrt=False)(function), function)
 
 
 def address_of(kernel: Callable, arguments: tuple, result: types.Type = types.none) -> int:

@@ -241,10 +241,18 @@ class Cache:
             os.replace(beside, path)
 
 
+KERNELS: list = []      # of this process
+
+
 def kernel(function):
     """Compile at the first call, keep the machine code on disk, release the GIL while running; division by zero is IEEE's."""
-    made = njit(nogil=True, error_model="numpy", forceinline=False)(function)       # or it takes that over from a caller
+    return kept(njit(nogil=True, error_model="numpy", forceinline=False)(function), function)       # or it takes that over from a caller
+
+
+def kept(made, function):
+    """What numba has made of a function, known as a kernel, its machine code to be kept on disk."""
     made._cache = Cache(function)
+    KERNELS.append(made)
     return made
 
 

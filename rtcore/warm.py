@@ -51,7 +51,7 @@ def _core(dtype):
 def _advance(dtype):
     scene, settings, camera = Scene(), Settings(view="depth", precision=_precision(dtype)), Camera()
     tracer = Tracer(flatten(scene, settings.precision), plan(scene, settings), settings, camera.rays(8, 8), None, camera.up, Background(),
-                    None, False)
+                    None, True, False)
     tracer.trace(Scratch(dtype, True), films.new_film(8, 8), new_todo(np.array([[0, 0, 8, 8, 1, 0, 8, 8]])), range(1), lambda: False)
 
 

@@ -15,6 +15,7 @@ from app.worker import Shown
 from rtcore.files import FileError, write_file
 
 EVERY = 150         # ms at least between two drawings
+SOON = 20           # ms from the panel's being shown to its drawing
 SAMPLES = (256, 1024, 4096)
 
 
@@ -70,7 +71,7 @@ class ConvergencePanel(Panel):
         under.addWidget(self.pins)
         self.column.addLayout(row)
         self.column.addLayout(under, 1)
-        self._timer = QTimer(self, interval=EVERY, singleShot=True)
+        self._timer = QTimer(self, singleShot=True)
         self._timer.timeout.connect(self._draw)
         session.frame_changed.connect(self._frame)
         self._changed()
@@ -85,7 +86,12 @@ class ConvergencePanel(Panel):
 
     def showEvent(self, event):
         super().showEvent(event)
-        self._draw_soon()
+        self._draw_soon(SOON)
+
+    def hideEvent(self, event):
+        super().hideEvent(event)
+        if self._figure is not None:        # its place stays; the window lays itself out and paints without it first
+            self._figure.hide()
 
     def close_down(self):
         """End the reference's thread with the window."""
@@ -139,9 +145,9 @@ class ConvergencePanel(Panel):
 
     # the drawing
 
-    def _draw_soon(self):
+    def _draw_soon(self, after: int = EVERY):
         if self.isVisible() and not self._timer.isActive():
-            self._timer.start()
+            self._timer.start(after)
 
     @Slot()
     def _draw(self):
@@ -155,8 +161,12 @@ class ConvergencePanel(Panel):
             self._figure = curves.ErrorFigure(plots.on_screen(self._theme))
             self._figure.setMinimumHeight(220)
             self._figure.setToolTip(self._figure.accessibleDescription())
+            policy = self._figure.sizePolicy()
+            policy.setRetainSizeWhenHidden(True)
+            self._figure.setSizePolicy(policy)
             self.place.addWidget(self._figure)
         self._figure.show_curves(self._curves())
+        self._figure.show()
         for row, name in enumerate(names(self.runs())[:len(self.pinned)]):      # as the plot has them
             self.pins.item(row).setText(name)
             self.pins.item(row).setForeground(QColor(self._figure.style_.color(row)))

@@ -86,7 +86,8 @@ def refer(renderer: Renderer, scene: Scene, camera: Camera, settings: Settings, 
         seed = (REFERENCE_SEED + part) ^ settings.seed
         chosen = msgspec.structs.replace(settings, samples=each, seed=seed, precision="f64", solver="certain", adaptive=False, seconds=None,
                                          error=None, view="beauty")
-        for frame in renderer.frames(RenderRequest(scene, camera, chosen, hits=False), cancelled, coarse=False):    # noqa: B007 -- the last one
+        request = RenderRequest(scene, camera, chosen, hits=False)
+        for frame in renderer.frames(request, cancelled, coarse=False):     # noqa: B007 -- the last one
             yield Step((part + renderer.progress) / PARTS, "reference")
         if cancelled():
             return
