@@ -229,6 +229,7 @@ class Soak(QObject):
 
     def panel(self) -> Iterator[float]:
         dock = self.random.choice(list(self.window.docks.values()))
+        self.heart.doing = f"panel {dock.windowTitle()}"
         shown = dock.isVisible()
         dock.setVisible(True)
         dock.raise_()
@@ -351,7 +352,7 @@ def report(heart: Heart, one: Soak, before: Held, after: Held) -> str:
              + "".join(f", {name}" for name, _ in after.signatures - before.signatures)
              + "".join(f", thread {name}" for name in set(after.threads) - set(before.threads)),
              "done: " + ", ".join(f"{name} {count}" for name, count in sorted(one.done.items()))]
-    lines += [f"  at {stall.at:6.1f} s {stall.doing:8} {stall.took * 1000:6.1f} ms, ran {stall.ran * 1000:6.1f}, no processor "
+    lines += [f"  at {stall.at:6.1f} s {stall.doing:17} {stall.took * 1000:6.1f} ms, ran {stall.ran * 1000:6.1f}, no processor "
               f"{stall.waited * 1000:6.1f}, processor asleep {stall.asleep * 1000:5.1f}" for stall in heart.stalls if stall.ours > PATIENCE]
     return "\n".join(lines)
 
