@@ -151,6 +151,8 @@ class ConvergencePanel(Panel):
 
     @Slot()
     def _draw(self):
+        if not self.isVisible():
+            return
         if self._plotting != "loaded":
             if self._plotting is None:
                 self._plotting = "loading"      # pyqtgraph: 0.4 s, so on a thread
