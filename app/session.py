@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from PySide6.QtCore import QObject, Signal, Slot
+from PySide6.QtCore import QObject, QTimer, Signal, Slot
 
 from app.compiling import Compiling
 from app.document import Document
@@ -19,6 +19,11 @@ from rtcore import camera as moves
 from rtcore.camera import Camera
 from rtcore.fields import FieldError, Record
 from rtcore.scene import Scene
+
+
+#: Milliseconds that the picture's size keeps still before it is rendered anew. Beside a thread that renders, a step of a window's resize
+#: takes the window's own thread twice as long, 8 ms and now and then 20; and when that picture came, it was of a size gone by.
+SETTLE = 30
 
 
 class Under(NamedTuple):
@@ -65,6 +70,8 @@ class Session(QObject):
         self._rendered: Scene | None = None
         self._merge: object = None              # the drag that the last change was a step of
         self._continues = False
+        self._settling = QTimer(self, interval=SETTLE, singleShot=True)
+        self._settling.timeout.connect(self._settled)
         self.document.changed.connect(self._scene_changed)
         self.worker.newest.connect(self._take_frame)
         self.worker.progressed.connect(self._compiling_moved)
@@ -235,11 +242,17 @@ class Session(QObject):
         self.set_options(msgspec.structs.replace(self.options, region=region))
 
     def resize(self, size: tuple[int, int], ratio: float):
-        """The viewport has this many device pixels, `ratio` of them to a pixel of the desktop's."""
+        """The viewport has this many device pixels, `ratio` of them to a pixel of the desktop's. While that changes, the last frame is
+        shown stretched."""
         if (size, ratio) != (self._size, self._ratio):
             self._size, self._ratio = size, ratio
             self._tell_outline()
-            self.submit(continues=True)
+            self.worker.drop()
+            self._settling.start()
+
+    @Slot()
+    def _settled(self):
+        self.submit(continues=True)
 
     def select(self, place: Place | None):
         if place != self.selection:
@@ -307,6 +320,7 @@ class Session(QObject):
 
     def submit(self, continues: bool = False, anew: bool = False):
         """Ask the worker for the picture as things stand now; `anew`: from its start, whatever is known of it."""
+        self._settling.stop()
         if self.camera is None or not all(self._size):
             return
         number = next(self._numbers)

@@ -50,6 +50,7 @@ class Worker(QObject):
         self._next: Job | None = None
         self._running: Job | None = None
         self._halted: Job | None = None         # stopped by a pause, to be gone on with
+        self._dropped = False                   # what runs is not to be gone on with
         self._paused = self._closing = False
         self._free = True                       # the window's thread is not in the midst of something
         self._submitted.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -74,6 +75,12 @@ class Worker(QObject):
                 self._submitted.emit()
         if self.compiling is not None and running is not None and running.document != job.document:
             self._compiler.kill()
+
+    def drop(self):
+        """End what runs and forget what waits: another job is to come."""
+        with self._wake:
+            self._next = self._halted = None
+            self._dropped = True
 
     @Slot()
     def _begin(self):
@@ -137,6 +144,7 @@ class Worker(QObject):
             self._wake.wait_for(lambda: self._closing or self._free and (
                 self._next is not None or (self._halted is not None and not self._paused)))
             self._running, self._next, self._halted = self._next or self._halted, None, None
+            self._dropped = False
             return None if self._closing else self._running
 
     def _render(self, engine: Engine, job: Job):
@@ -154,9 +162,11 @@ class Worker(QObject):
         started, shown, whole = time.monotonic(), 0, False
 
         def cancelled() -> bool:
+            if self._closing or self._dropped:
+                return True
             newer = self._next
-            if newer is None or self._closing:
-                return self._closing or (self._paused and whole)
+            if newer is None:
+                return self._paused and whole
             return shown > 0 or not newer.continues or time.monotonic() - started > PATIENCE
 
         for frame in engine.frames(request, cancelled, job.continues):
@@ -166,7 +176,7 @@ class Worker(QObject):
                 break
         if whole and not frame.done:
             with self._wake:
-                self._halted = job._replace(anew=False)
+                self._halted = None if self._dropped else job._replace(anew=False)
 
     def _compile(self, names: list[str]):
         def progress(state: Compiling | None):
