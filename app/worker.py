@@ -18,7 +18,7 @@ from app.outline import Outline, trace_outline
 if TYPE_CHECKING:
     from rtcore.progressive import Frame
 
-NICE = 5            # by how much the window's thread goes before those that trace, where all processors are busy
+NICE = 10           # by how much the window's thread goes before those that trace, where all processors are busy
 PATIENCE = 1.0      # s that a step of a drag may take to its first pass though a newer step waits; else a fast drag would show nothing
 
 
