@@ -152,6 +152,31 @@ def test_resolution_scale_changes_the_size_of_the_picture(session, settled):
     assert session.shown.job.size == (80, 60)
 
 
+def test_while_its_size_changes_the_picture_is_not_rendered(session, double, qtbot, settled):
+    settled(session)
+    double.pause = 0.2
+    session.switch("fog", False)
+    qtbot.waitUntil(lambda: len(double.jobs) == 2)
+    for width in range(161, 171):
+        session.resize((width, 120), 1.0)
+        qtbot.wait(5)
+    assert len(double.jobs) == 2
+    double.pause = 0.0
+    qtbot.waitUntil(lambda: session.shown.job.size == (170, 120) and session.shown.frame.done)
+    assert len(double.jobs) == 3 and session.shown.job.options.fog is False
+    qtbot.wait(100)
+    assert len(double.jobs) == 3        # what was ended on the way does not go on
+
+
+def test_a_change_beside_a_resize_is_not_kept_waiting(session, double, qtbot, settled):
+    settled(session)
+    session.resize((180, 120), 1.0)
+    session.switch("fog", False)
+    qtbot.waitUntil(lambda: session.shown.job.size == (180, 120) and session.shown.frame.done)
+    qtbot.wait(100)
+    assert len(double.jobs) == 2        # it was the picture for the new size as well
+
+
 @pytest.fixture
 def filing(session):
     return Filing(session)

@@ -57,6 +57,24 @@ def test_a_newer_job_ends_the_older_one(start, qtbot, scene):
     assert time.monotonic() - began < 1.0
 
 
+def test_a_dropped_job_ends_at_once_and_does_not_come_back(start, qtbot, scene):
+    double = Double(pause=0.2, spacings=(1,) * 20)
+    worker, numbers = start(double), []
+    worker.newest.connect(lambda: numbers.append(worker.take().job.number))
+    worker.submit(job(scene, 1))
+    qtbot.waitUntil(lambda: len(numbers) == 1)      # refined from now on
+    worker.drop()
+    qtbot.wait(300)
+    assert numbers == [1] and len(double.jobs) == 1
+    worker.submit(job(scene, 2))
+    qtbot.waitUntil(lambda: len(double.jobs) == 2)
+    worker.drop()                                   # before its first frame, and though the next is a step of the same drag
+    double.pause = 0.0
+    worker.submit(job(scene, 3, continues=True))
+    qtbot.waitUntil(lambda: 3 in numbers)
+    assert 2 not in numbers
+
+
 def test_a_step_of_a_drag_may_show_its_first_pass(start, qtbot, scene):
     double = Double(pause=0.08)
     worker, numbers = start(double), []
