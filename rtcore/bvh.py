@@ -1,8 +1,8 @@
 """Bounding volume hierarchy: build and validate; `walk.py` walks it.
 
-Built binary by binned surface area (Wald 2007), then collapsed so that a node has up to eight children, whose boxes one vector instruction
-tests together. Boxes are float32 in the tree's own frame, (world - center)·scale, where the root fits into -1 .. 1: so a scene far from the
-origin or of any size costs nothing in precision.
+Built binary by binned surface area (Wald 2007), then collapsed so that a node has up to eight children (Ylitie, Karras, Laine 2017), whose
+boxes one vector instruction tests together. Boxes are float32 in the tree's own frame, (world - center)·scale, where the root fits into
+-1 .. 1: so a scene far from the origin or of any size costs nothing in precision.
 """
 from typing import NamedTuple
 
@@ -121,12 +121,42 @@ def _split(low, high, leaf_most, box, link, order):
 
 
 @kernel
-def _widen(box, link, wide, children):
-    """The binary tree with up to eight children a node: the largest inner child gives way to its two until there are eight. Returns the
-    number of nodes; wide and children, as `Tree.box` and `Tree.link`, have room for as many as the binary tree has."""
+def _best_cuts(box, link, cost, cut):
+    """Where to cut the binary tree into nodes of up to eight children so that the sum of their areas, which is that of their visits, is the
+    least (Ylitie, Karras, Laine 2017, section 3.1; here the leaves are given).
+
+    cost, float32 (n, 8), is scratch: cost[b, i] is the sum below b if b may become i children of one node, of which it is one itself for
+    i = 1. cut, int8 (n, 8): how many of them b's left child becomes; 0: b is no more than with i - 1, or a leaf. cut[b, 1] is for b's own
+    eight children.
+    """
+    for b in range(len(box) - 1, -1, -1):       # children come after their parents
+        cut[b], cost[b] = 0, 0
+        if link[b, 1] > 0:
+            continue
+        left, right = b + 1, link[b, 0]
+        ex, ey, ez = box[b, 3] - box[b, 0], box[b, 4] - box[b, 1], box[b, 5] - box[b, 2]
+        for i in range(1, WIDTH):
+            most = WIDTH if i == 1 else i
+            best, best_k = np.float32(np.inf), 0
+            for k in range(1, most):
+                c = cost[left, k] + cost[right, most - k]
+                if c < best:
+                    best, best_k = c, k
+            if i == 1:
+                best += ex * ey + ey * ez + ez * ex
+            elif not best < cost[b, i - 1]:
+                best, best_k = cost[b, i - 1], 0
+            cost[b, i], cut[b, i] = best, best_k
+
+
+@kernel
+def _widen(box, link, cut, wide, children):
+    """The binary tree with up to eight children a node, cut as `_best_cuts` says. Returns the number of nodes; wide and children, as
+    `Tree.box` and `Tree.link`, have room for as many as the binary tree has."""
     stack = np.empty((DEEPEST + 32) * WIDTH, np.int32)      # binary nodes that become wide ones
     slot = np.empty((DEEPEST + 32) * WIDTH, np.int32)       # where their number belongs: 8 parent + column
     kids, key, rank = np.empty(WIDTH, np.int32), np.empty(WIDTH), np.empty(WIDTH, np.int64)
+    part, share = np.empty(WIDTH, np.int32), np.empty(WIDTH, np.int64)      # what is still to be cut, into how many
     stack[0], slot[0] = 0, -1
     top, nodes = 1, 0
     while top > 0:
@@ -134,22 +164,22 @@ def _widen(box, link, wide, children):
         node, nodes = nodes, nodes + 1
         if slot[top] >= 0:
             children[NODE * (slot[top] // WIDTH) + LINK, slot[top] % WIDTH] = node
-        kids[0] = stack[top]
-        n = 1
-        while n < WIDTH:
-            widest, best = -1, -1.0
-            for k in range(n):
-                b = kids[k]
-                if link[b, 1] <= 0:
-                    ex, ey, ez = box[b, 3] - box[b, 0], box[b, 4] - box[b, 1], box[b, 5] - box[b, 2]
-                    area = ex * ey + ey * ez + ez * ex
-                    if area > best:
-                        widest, best = k, area
-            if widest < 0:
-                break
-            b = kids[widest]
-            kids[widest], kids[n] = b + 1, link[b, 0]
-            n += 1
+        n, parts = 0, 1
+        part[0], share[0] = stack[top], WIDTH
+        while parts > 0:
+            parts -= 1
+            b, i = part[parts], share[parts]
+            k = cut[b, 1] if i == WIDTH else cut[b, i]
+            while k == 0 and i > 1:
+                i -= 1
+                k = cut[b, i]
+            if i == 1 or link[b, 1] > 0:
+                kids[n] = b
+                n += 1
+            else:
+                part[parts], share[parts] = link[b, 0], i - k
+                part[parts + 1], share[parts + 1] = b + 1, k
+                parts += 2
         for k in range(WIDTH):
             for row in range(3):
                 wide[NODE * node + row, k], wide[NODE * node + 3 + row, k] = NOWHERE, -NOWHERE
@@ -202,7 +232,10 @@ def build(low: np.ndarray, high: np.ndarray, leaf_most: int) -> tuple[Tree, np.n
     outward[:, :3] = np.nextafter(outward[:, :3], np.float32(-np.inf))
     outward[:, 3:] = np.nextafter(outward[:, 3:], np.float32(np.inf))
     rows = _lines(NODE * (len(box) // 2 + 1))
-    nodes = _widen(outward, link, rows.view(np.float32), rows)
+    cut = np.zeros((len(outward), WIDTH), np.int8)
+    if n > leaf_most:
+        _best_cuts(outward, link, np.empty((len(outward), WIDTH), np.float32), cut)
+    nodes = _widen(outward, link, cut, rows.view(np.float32), rows)
     kept = _lines(NODE * nodes)
     kept[:] = rows[:NODE * nodes]
     return Tree(kept.view(np.float32), kept, np.array([*center, scale])), order

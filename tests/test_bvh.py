@@ -1,10 +1,12 @@
 """The tree: sound whatever the boxes, no deeper than its stack, and never in the way of a hit."""
+import functools
+
 import numpy as np
 import pytest
 
 import rtcore
 from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Polygon, Scene, Sphere, Triangle
-from rtcore.bvh import LINK, NODE, build, validate
+from rtcore.bvh import LINK, NODE, _split, build, validate
 from rtcore.flatten import flatten
 from rtcore.wave import CLOSEST, DEAD, DX, OPAQUE, OX, START, T, new_rays
 
@@ -55,6 +57,31 @@ def test_tree_is_sound(name, n):
     there = there.transpose(0, 2, 1).reshape(-1, 6)
     there = there[there[:, 0] <= there[:, 3]]
     assert np.isfinite(there).all() and np.abs(there).max() < 1.001
+
+
+@pytest.mark.parametrize("name", ["random", "clustered", "geometric"])
+@pytest.mark.parametrize("n", [2, 9, 40, 200])
+def test_the_sum_of_the_nodes_areas_is_the_least_there_is(name, n):
+    """Against all ways to cut the same binary tree, by trying them."""
+    low, high = (side / 1e3 for side in boxes(name, n))
+    box, link = np.empty((2 * n, 6)), np.empty((2 * n, 2), np.int32)
+    box = box[:_split(low, high, 1, box, link, np.arange(n, dtype=np.int32))]
+    size = box[:, 3:] - box[:, :3]
+    area = size[:, 0] * size[:, 1] + size[:, 1] * size[:, 2] + size[:, 2] * size[:, 0]
+
+    @functools.cache
+    def least(b: int, room: int) -> float:
+        """Of all nodes below b if it may become so many children of one node."""
+        if link[b, 1] > 0:
+            return 0.0
+        alone = area[b] + min(least(b + 1, k) + least(link[b, 0], 8 - k) for k in range(1, 8))
+        return min([alone] + [least(b + 1, k) + least(link[b, 0], room - k) for k in range(1, room)])
+    tree, _ = build(low, high, 1)
+    nodes, links = tree.box.reshape(-1, NODE, 8).astype(float), tree.link.reshape(-1, NODE, 8)[:, LINK]
+    x, y, z = (nodes[:, 3 + k] - nodes[:, k] for k in range(3))
+    inner = (links > 0) & (x >= 0)
+    total = area[0] + (x * y + y * z + z * x)[inner].sum() / tree.frame[3] ** 2
+    assert total == pytest.approx(least(0, 1), rel=1e-4)
 
 
 def test_validate_finds_a_primitive_that_sticks_out():

@@ -1,10 +1,13 @@
 """Rays that leave a surface: spawned as the shading spawns them, they neither meet a convex shape again on its outside, nor miss what
 stands a hair away."""
+from fractions import Fraction
+
 import msgspec
 import numpy as np
 import pytest
 
-from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Scene, Sphere, Triangle
+import rtcore
+from rtcore import Box, Cone, Cylinder, Matrix, Mesh, Node, Plane, Polygon, Scale, Scene, Sphere, Triangle
 from rtcore.flatten import flatten
 from rtcore.wave import CLOSEST, DEAD, DX, ERR, GX, OX, PX, START, SURFACE_ROWS, T, new_rays
 
@@ -157,3 +160,30 @@ def test_error_bound_covers_the_error(precision):
             off = np.abs(((p - row[:3, None]) * row[3:6, None]).sum(0))
         assert (off <= surface[ERR]).all()
         assert (off > 0).any()
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+@pytest.mark.parametrize("scale", [(1, 1, 1), (1, 2, 0.5)], ids=["sphere", "ellipsoid"])
+@pytest.mark.parametrize("center", [(0, 0, 0), (3.5, -40.25, 7)], ids=["near", "far"])
+def test_starts_a_few_roundings_from_a_sphere_are_told_apart(center, scale, precision):
+    """In or out, toward or away, and all but level with the surface: whether anything is met, against fractions."""
+    n, radius, rng = 3000, 0.1, np.random.default_rng(11)
+    dtype = np.dtype("f8" if precision == "f64" else "f4").type
+    eps, stretch = EPS[precision], np.array(scale)
+    up = rng.normal(size=(n, 3))
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    level = np.cross(up, rng.normal(size=(n, 3)))
+    steep = rng.choice([-1, 1], n) * 10 ** rng.uniform(np.log10(eps) - 1, 0.5, n)
+    off = eps * rng.choice([-1, 1], n) * 10 ** rng.uniform(-1, 3.5, n)
+    origin = ((np.array(center) + radius * up * (1 + off[:, None])) * stretch).astype(dtype)
+    direction = ((level + steep[:, None] * up) * stretch).astype(dtype)
+    ball = Sphere(center, float(dtype(radius)))
+    scene = Scene(objects=[Node(shape=ball, transform=[Scale(scale)] if scale != (1, 1, 1) else [])])
+    met = np.isfinite(rtcore.intersect(scene, origin, direction, precision=precision).t)
+    for o, d, found in zip(origin.tolist(), direction.tolist(), met):
+        f = [Fraction(x) / Fraction(s) - Fraction(c) for x, s, c in zip(o, scale, center)]
+        v = [Fraction(x) / Fraction(s) for x, s in zip(d, scale)]
+        a, b, c = (sum(x * y for x, y in zip(*pair)) for pair in ((v, v), (f, v), (f, f)))
+        c -= Fraction(ball.radius) ** 2
+        assert found == (c < 0 or (b < 0 and b * b >= a * c)), (o, d)
+    assert 0.2 < met.mean() < 0.9

@@ -42,6 +42,14 @@ def may_meet(near):
 
 
 @inline
+def leads_away(f, near, radius, doubt):
+    """Lanes that start outside the ball for certain and move away from it, as those do that leave it: half of all tests that come so far
+    are of a ray and the sphere that sent it. doubt: what f² - radius² may be off; so little that where rounding has got the sign of f·d
+    wrong, the line passes at |f| to all digits, and misses."""
+    return (near[1] < 0) & (dot(f, f) - radius * radius > doubt)
+
+
+@inline
 def advance(f, f1, s, v, v1):
     """(f + f1) + s (v + v1) as a pair."""
     p, e = two_product(s, v)

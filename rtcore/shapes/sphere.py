@@ -22,7 +22,7 @@ from rtcore.lanes import LANES, any_lane, bits, dot, load, load3, rounded, size,
 from rtcore.pairs import two_sum
 from rtcore.scene import Scale, Shape, invertible
 from rtcore.shapes import _textbook
-from rtcore.shapes._ball import U32, U64, choose, closest, extent, lowest, may_meet, settle_one
+from rtcore.shapes._ball import U32, U64, choose, closest, extent, leads_away, lowest, may_meet, settle_one
 from rtcore.shapes._unit import PLACE, into_plain, line_expanded, line_in_pairs, noise_here
 from rtcore.shapes._surface import extent_of, hits_from, new_room, put_all_placed, put_globe, put_surfaces, unit_hits
 from rtcore.shapes.kind import CENTER, OWN, Kind, Packed, forward, into, placed, placed_bounds, power_near
@@ -86,10 +86,13 @@ def quick_sphere(rays, i, data, q):
 
 @inline
 def approach(ray, i, data, exact, q):
-    """Of eight rays and sphere q: the origins seen from the centre in units of the sphere's, a bound on their size, what `closest` says."""
+    """Of eight rays and sphere q: a bound on the size of the origins seen from the centre, in units of the sphere's; what `closest` says;
+    the lanes that lead away."""
     f = ((wide(load3(ray, OX, i)) - splat3(exact, q, 0)) - splat3(exact, q, 3)) * np.float64(data[q, 5])
-    far = extent(f)
-    return far, closest(f, wide(load3(ray, DX, i)), exact[q, 6], far, U64)
+    far, radius = extent(f), exact[q, 6]
+    near = closest(f, wide(load3(ray, DX, i)), radius, far, U64)
+    # each part of f is off by 2 roundings of itself, f² by 8 of f², radius² by 3
+    return far, near, leads_away(f, near, radius, 16 * U64 * dot(f, f))
 
 
 @inline
@@ -143,8 +146,8 @@ def intersect(rays, n, tree, table, first, opacity):
                     i = start + 8 * lowest_bit(active)
                     active &= active - 1
                     if table.data.itemsize == 8 or quick_sphere(rays, i, table.data, q):
-                        far, near = approach(rays.ray, i, table.data, table.exact, q)
-                        todo = may_meet(near) & alive(rays.ray, i)
+                        far, near, gone = approach(rays.ray, i, table.data, table.exact, q)
+                        todo = may_meet(near) & alive(rays.ray, i) & ~gone
                         if any_lane(todo):
                             t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
@@ -195,7 +198,9 @@ def approach_ellipsoid(ray, i, data, exact, q):
     g, v = (wide(load3(ray, OX, i)) - splat3(exact, q, PLACE)) - splat3(exact, q, PLACE + 3), wide(load3(ray, DX, i))
     f, d = into_plain(exact, q, g), into_plain(exact, q, v)
     far = reach(np.float64(data[q, MOST]), g, v, f, d)
-    return far, closest(f, d, 1, far, U64)
+    near = closest(f, d, 1, far, U64)
+    # f is off by 4 roundings of `far`, f² by 14 of its square
+    return far, near, leads_away(f, near, 1, 32 * U64 * (far * far))
 
 
 @inline
@@ -238,8 +243,8 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                     i = start + 8 * lowest_bit(active)
                     active &= active - 1
                     if table.data.itemsize == 8 or quick_ellipsoid(rays, i, table.data, q):
-                        far, near = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
-                        todo = may_meet(near) & alive(rays.ray, i)
+                        far, near, gone = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
+                        todo = may_meet(near) & alive(rays.ray, i) & ~gone
                         if any_lane(todo):
                             side = table.side[q]
                             t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, side, where)
