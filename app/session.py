@@ -243,7 +243,7 @@ class Session(QObject):
 
     def resize(self, size: tuple[int, int], ratio: float):
         """The viewport has this many device pixels, `ratio` of them to a pixel of the desktop's. While that changes, the last frame is
-        shown stretched."""
+        shown, scaled to the height."""
         if (size, ratio) != (self._size, self._ratio):
             self._size, self._ratio = size, ratio
             self._tell_outline()
