@@ -34,8 +34,8 @@ SLOTS = 8               # rays walked in turns; a power of two
 BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
 
 #: A beam's rays have at least this part along a common axis, and slopes that differ by no more than SPREAD; or NARROW where a test is dear,
-#: for rays on their own tell more exactly what is met (spheres and cones: tree.nff takes 7 % less; triangles in tetra.nff would take 10 %
-#: more); or WIDE where rays that scatter would be walked singly. Others scatter.
+#: for rays on their own tell more exactly what is met (spheres and cones: tree.nff takes 5 % less; the triangles of tetra.nff would take
+#: 5 to 10 % more); or WIDE where rays that scatter would be walked singly. Others scatter.
 STRAIGHT, SPREAD, NARROW, WIDE = np.float32(0.4), np.float32(0.05), np.float32(0.02), np.float32(0.35)
 
 
