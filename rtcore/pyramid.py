@@ -7,8 +7,9 @@ from rtcore.lanes import greatest, least, load, select, size, splat
 
 # rows of Walk.coarse: 1/direction, offsets of low and of high planes, reach, direction, origin
 INVERSE, LOWS, HIGHS, REACH, WAY, FROM = 0, 3, 6, 9, 10, 13
-# places in Walk.state; nodes are eight rows and eight children, so that places are told by shifts
-TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING, OCTANT = range(8)
+# places in Walk.state; nodes are eight rows and eight children, so that places are told by shifts. FLOOR: where on the stack what waits of
+# SOME rays begins, -1: a beam is whole
+TOP, ACTIVE, MODE, WAITING, AXIS, ALIVE, RUNNING, OCTANT, FLOOR = range(9)
 # places in Walk.beam: over all rays the least and the largest origin and slope (the step for a step along the main axis), the main axis'
 # direction, how far any ray still reaches, and what to add to a plane for its earliest entry and latest exit
 BEAM_FROM, BEAM_TO, SLOPE_FROM, SLOPE_TO, SIGN, FARTHEST, ENTER, LEAVE = 0, 3, 6, 9, 12, 13, 14, 15

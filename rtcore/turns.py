@@ -127,6 +127,14 @@ def octets(tc, rays):
 
 
 @intrinsic
+def ones(tc, number):
+    """How many bits of an int64 are set."""
+    def gen(ctx, b, sig, a):
+        return b.call(cgutils.get_or_insert_function(b.module, ir.FunctionType(I64, [I64]), "llvm.ctpop.i64"), [a[0]])
+    return types.int64(number), gen
+
+
+@intrinsic
 def meeting(tc, coarse, box, row, column):
     """Which of the 64 rays of a packet, as `Walk.coarse` has them, meet the box in column `column` of the six rows from `row` on: an int64,
     bit k for ray k. Sixteen at a time, which is one instruction where a processor's vectors are that long and two where not."""

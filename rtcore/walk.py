@@ -2,9 +2,10 @@
 
 Rays that keep together - from the eye, toward a light, off a plane mirror - are walked as a *beam*: the pyramid around them is tested
 against the eight children of a node at once. Where a child is wider than the pyramid that is all; the others and all leaves are tested
-against the rays, eight at a time. Rays that scatter are walked without a pyramid, or, through large trees, each on its own against eight
-boxes at once, several in turns, so that none waits for memory. Whichever way, `next_leaf` gives the next leaf that may be hit and the
-vectors of rays that may hit it: a shape's kernel knows no difference.
+against the rays, sixteen at a time. Where few of them are left, and from the root on for rays that scatter, it is each ray that is tested
+against the eight children; through large trees, rays that scatter are walked singly, several in turns, so that none waits for memory.
+Whichever way, `next_leaf` gives the next leaf that may be hit and the vectors of rays that may hit it: a shape's kernel knows no
+difference.
 
 A ray enters the tree's frame at the root's box and with a direction whose largest part is 1: neither distance nor speed costs precision,
 and no inf or NaN can arise. Tests are conservative: origins are shifted outward by a bound on all rounding (SLACK), so no hit is culled.
@@ -17,9 +18,9 @@ from rtcore.across import largest, lowest_bit
 from rtcore.bvh import LINK, NO_CHILD, NODE, ORDER, STACK, WIDTH
 from rtcore.jit import inline, inline_new
 from rtcore.lanes import (along, any_lane, bits, fma, greatest, least, load, load3, narrow, select, size, splat, store, vec3, with_sign)
-from rtcore.pyramid import (ACTIVE, ALIVE, AXIS, BEAM_FROM, BEAM_TO, ENTER, FARTHEST, FROM, HIGHS, INVERSE, LEAVE, LOWS, MODE, OCTANT,
-                            REACH, RUNNING, SIGN, SLOPE_FROM, SLOPE_TO, TOP, WAITING, WAY, bundle, common)
-from rtcore.turns import empty_sets, joined, keep, meeting, octets, prefetch_either, push
+from rtcore.pyramid import (ACTIVE, ALIVE, AXIS, BEAM_FROM, BEAM_TO, ENTER, FARTHEST, FLOOR, FROM, HIGHS, INVERSE, LEAVE, LOWS, MODE,
+                            OCTANT, REACH, RUNNING, SIGN, SLOPE_FROM, SLOPE_TO, TOP, WAITING, WAY, bundle, common)
+from rtcore.turns import empty_sets, joined, keep, meeting, octets, ones, prefetch_either, push
 from rtcore.wave import DX, OX, START, UNWANTED, T
 
 PACKET = 64
@@ -30,13 +31,16 @@ TINY = 2.0 ** -60       # a direction's part that counts as 0
 
 #: state[MODE]: a pyramid around all rays, each ray on its own, those that meet a node together; or there is one leaf and nothing to walk.
 BEAM, SINGLY, SOME, ALONE = range(4)
+#: Of a beam that meets a node with no more rays than this, these are walked on as SOME: 8 % faster in the gallery's snail, 4 to 10 % in the
+#: pictures of balls, tree and mount, nothing in tetra; with 16 or 64 the same within 2 %.
+FEW = 32
+APART = -2              # in place of a leaf: a beam has just come down to few rays
 SLOTS = 8               # rays walked in turns; a power of two
 BEAM_SLACK = np.float32(2.0 ** -17)     # rounding of slopes, entries and products comes to less than a quarter of it
 
-#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than SPREAD; or NARROW where a test is dear,
-#: for rays on their own tell more exactly what is met (spheres and cones: tree.nff takes 5 % less; the triangles of tetra.nff would take
-#: 5 to 10 % more); or WIDE where rays that scatter would be walked singly. Others scatter.
-STRAIGHT, SPREAD, NARROW, WIDE = np.float32(0.4), np.float32(0.05), np.float32(0.02), np.float32(0.35)
+#: A beam's rays have at least this part along a common axis, and slopes that differ by no more than SPREAD; or WIDE where rays that scatter
+#: would be walked singly. Others scatter.
+STRAIGHT, SPREAD, WIDE = np.float32(0.4), np.float32(0.05), np.float32(0.35)
 
 
 class Walk(NamedTuple):
@@ -47,7 +51,7 @@ class Walk(NamedTuple):
     beam: np.ndarray    # float32 (16), as named above
     limit: np.ndarray   # int32 (16, 64): the bits of coarse
     keys: np.ndarray    # int64 (slots, most): what waits of single rays, as `push` leaves it
-    stack: np.ndarray   # int32 (1, most): what waits of packets: 2 (8 node + column) + whether all meet it; of SOME rays, the link to it
+    stack: np.ndarray   # int32 (1, most): what waits of beams: 2 (8 node + column) + whether all meet it; of SOME rays, the link to it
     entry: np.ndarray   # float32 (1, most): where it is entered
     mask: np.ndarray    # int64 (most): the vectors that wait for a node; of SOME rays, the rays
     slots: np.ndarray   # int64 (slots, 2): the ray, -1 none any more; how many nodes wait
@@ -63,14 +67,13 @@ def new_walk(rays):
     return Walk(coarse, np.empty((2, PACKET), rays.ray.dtype), np.empty(16, np.float32), coarse.view(np.int32),
                 np.empty((SLOTS, STACK + WIDTH), np.int64), np.empty((1, STACK), np.int32), np.empty((1, STACK), np.float32),
                 np.empty(STACK, np.int64), np.empty((SLOTS, 2), np.int64), np.empty((1, WIDTH), np.float32), np.empty(WIDTH, np.int64),
-                np.empty(8, np.int64))
+                np.empty(9, np.int64))
 
 
 @inline
-def begin(walk, rays, start, n, tree, singly, spread):
+def begin(walk, rays, start, n, tree, singly):
     """Bring the packet of rays start .. min(start + 64, n) to the tree's root; none of them once they are not wanted any more. singly: how
-    many nodes a tree must have for rays that scatter to be walked singly, which costs less where nodes come from memory. spread: SPREAD or
-    NARROW."""
+    many nodes a tree must have for rays that scatter to be walked singly, which costs less where nodes come from memory."""
     eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
     frame, coarse, fine, state, box = tree.frame, walk.coarse, walk.fine, walk.state, tree.box
     alone = box.shape[0] > 0 and tree.link[LINK, 0] < 0 and box[0, 1] > box[3, 1]
@@ -144,18 +147,18 @@ def begin(walk, rays, start, n, tree, singly, spread):
         axis = 0 if along_x >= along_y and along_x >= along_z else 1 if along_y >= along_z else 2
         state[MODE], large = BEAM, NODE * singly <= tree.link.shape[0]
         straight = max(along_x, max(along_y, along_z)) >= STRAIGHT
-        if not straight or not bundle(coarse, walk.beam, state, axis, largest(fuzz), groups, WIDE if large else spread):
+        if not straight or not bundle(coarse, walk.beam, state, axis, largest(fuzz), groups, WIDE if large else SPREAD):
             if large:
                 state[MODE], state[RUNNING] = SINGLY, SLOTS
                 for k in range(SLOTS):
                     walk.slots[k, 0], walk.slots[k, 1] = 0, 0
             else:
-                some = lowest_bit(waiting)
                 state[MODE] = SOME
-                state[OCTANT] = (coarse[WAY, some] < 0) + 2 * (coarse[WAY + 1, some] < 0) + 4 * (coarse[WAY + 2, some] < 0)
-        walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP] = -1, 0, alive, 1
+        some = lowest_bit(waiting)
+        state[OCTANT] = (coarse[WAY, some] < 0) + 2 * (coarse[WAY + 1, some] < 0) + 4 * (coarse[WAY + 2, some] < 0)
+        walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP], state[FLOOR] = -1, 0, alive, 1, -1
         if state[MODE] == SOME:
-            walk.stack[0, 0], walk.mask[0] = 0, waiting
+            walk.stack[0, 0], walk.mask[0], state[FLOOR] = 0, waiting, 0
 
 
 @inline
@@ -187,13 +190,20 @@ def shrink(walk, rays, start):
 def next_leaf(walk, tree, table):
     """The next leaf that rays of the packet may hit, as `leaf_first` and `leaf_end` read it, or -1; `active` tells the vectors that may.
     table: of the primitives, a `kind.Table`, to be fetched ahead."""
-    mode = walk.state[MODE]
-    if mode == BEAM:
-        return _next_of_packet(walk, tree, table)
-    if mode == ALONE:
-        walk.state[TOP] -= 1
-        return -1 - np.int64(tree.link[LINK, 0]) if walk.state[TOP] == 0 else -1
-    return _next_of_some(walk, tree, table) if mode == SOME else _next_of_ray(walk, tree, table)
+    state, leaf = walk.state, APART
+    if state[MODE] == ALONE:
+        state[TOP] -= 1
+        return -1 - np.int64(tree.link[LINK, 0]) if state[TOP] == 0 else -1
+    if state[MODE] == SINGLY:
+        return _next_of_ray(walk, tree, table)
+    while leaf == APART:
+        if state[FLOOR] >= 0:
+            leaf = _next_of_some(walk, tree, table)
+            if leaf >= 0 or state[MODE] == SOME:
+                return leaf
+            state[FLOOR] = -1
+        leaf = _next_of_beam(walk, tree, table)
+    return leaf
 
 
 @inline
@@ -266,13 +276,14 @@ def _next_of_ray(walk, tree, table):
 
 @inline
 def _next_of_some(walk, tree, table):
-    """Rays that scatter, all of which that meet a node together: each against its eight children at once."""
+    """Rays that scatter, or are few, all of which that meet a node together: each against its eight children at once. Down to the floor of
+    the stack, below which a beam's nodes wait."""
     coarse, stack, mask, met, state = walk.coarse, walk.stack, walk.mask, walk.met, walk.state
     box, link = tree.box, tree.link
-    top, octant = state[TOP], state[OCTANT]
-    while top > 0:
+    top, octant, floor = state[TOP], state[OCTANT], state[FLOOR]
+    while top > floor:
         top -= 1
-        node, rays, below = np.int64(stack[0, top]), mask[top], np.int64(stack[0, max(top - 1, 0)])
+        node, rays, below = np.int64(stack[0, top]), mask[top], np.int64(stack[0, max(top - 1, floor)])
         prefetch_either(below >= 0, box, NODE * below, table.data, table.exact, leaf_first(-1 - below))
         if node < 0:
             state[TOP], state[ACTIVE] = top, octets(rays)
@@ -298,13 +309,14 @@ def _next_of_some(walk, tree, table):
             stack[0, top], mask[top] = link[row + LINK, k], met[k]
             top += met[k] != 0
             order >>= 4
-    state[TOP] = 0
+    state[TOP] = floor
     return -1
 
 
 @inline
-def _next_of_packet(walk, tree, table):
-    """All rays together: the next leaf that one of them meets. A box that is wider than the beam around them is taken to be met."""
+def _next_of_beam(walk, tree, table):
+    """All rays together: the next leaf that one of them meets, or APART once few meet a node. A box that is wider than the beam around them
+    is taken to be met."""
     coarse, beam, stack, entry, mask, near, state = walk.coarse, walk.beam, walk.stack, walk.entry, walk.mask, walk.near, walk.state
     box, link = tree.box, tree.link
     top, axis = state[TOP], state[AXIS]
@@ -324,12 +336,16 @@ def _next_of_packet(walk, tree, table):
             row = (place >> 4) << 3
             node = np.int64(link[row + LINK, k])
             if node < 0 or place & 1 == 0:
-                waiting &= octets(meeting(coarse, box, row, k))
+                rays = meeting(coarse, box, row, k) & state[WAITING]       # not what a longer packet has left behind
+                waiting &= octets(rays)
                 if waiting == 0:
                     continue
                 if node < 0:
                     state[TOP], state[ACTIVE] = top, waiting
                     return -1 - node
+                if ones(rays) <= FEW:
+                    stack[0, top], mask[top], state[TOP], state[FLOOR] = node, rays, top + 1, top
+                    return APART
         row = node << 3
         enter = greatest(fma(load(box, row + main0, 0), sign, beam[ENTER]), np.float32(0))
         leave = least(fma(load(box, row + main1, 0), sign, beam[LEAVE]), farthest)

@@ -209,6 +209,30 @@ class TestWalk:
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_beam_that_comes_apart(name, precision):
+    """Parallel rays among shapes smaller than their bundle: of a packet only few meet a node. A packet of nine comes after a full one, and
+    what is in the columns behind it stays as it was, alive though it looks."""
+    geometry, n = flatten(crowd(name, n=300), precision), 73
+    (group,) = geometry.groups
+    u, v = np.meshgrid(np.linspace(-1, 1, 8), np.linspace(-1, 1, 8))
+    full = np.stack([u.ravel(), v.ravel(), u.ravel() * 0 - 3], 1)
+    o = np.concatenate([full, full])        # behind the nine are those that the packet before has at these places
+    results = []
+    for tree in group.tree, build(np.full((300, 3), -1e30), np.full((300, 3), 1e30), 8)[0]:
+        rays = new_rays(len(o), geometry.dtype)
+        rays.ray[:], rays.prim[:], rays.depth[:] = 0, -1, 0
+        rays.ray[OX:OX + 3], rays.ray[DX + 2], rays.ray[T] = o.T, 1, np.inf
+        rays.ray[T, n:80] = DEAD            # the rest of the last vector
+        group.kind.intersect(rays, n, tree, group.table, group.first, CLOSEST)
+        results.append((rays.ray[T].copy(), rays.prim.copy()))
+    (t, prim), (t_all, prim_all) = results
+    np.testing.assert_array_equal(prim, prim_all)
+    np.testing.assert_array_equal(t, t_all)
+    assert (t[80:] == np.inf).all() and (prim[80:] == -1).all() and (prim[80 - 64:64] >= 0).sum() > 5
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
 def test_rays_in_the_planes_of_box_faces(precision):
     """A wall of equal boxes: rays along the seams, in the planes that boxes and nodes share."""
     scene = Scene(objects=[Box((i, j, 0), (i + 1, j + 1, 1)) for i in range(6) for j in range(6)])

@@ -3,7 +3,7 @@ certain: far from the eye the square of the distance leaves nothing of the radiu
 from rtcore.jit import inline, kernel
 from rtcore.lanes import load, load3, root, select, splat3
 from rtcore.shapes.kind import BACK, FRONT, into
-from rtcore.walk import ACTIVE, NARROW, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.wave import DX, OX, START, record
 
 
@@ -32,7 +32,7 @@ def meet(rays, i, p, f, d, square, side, opacity):
 def intersect_sphere(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, NARROW)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
@@ -50,7 +50,7 @@ def intersect_sphere(rays, n, tree, table, first, opacity):
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk, data = new_walk(rays), table.data
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, NARROW)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.walk import ACTIVE, PACKET, SPREAD, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse, moved, parts
 from rtcore.fields import Field, FieldError, Number, Vec, Vector
 from rtcore.jit import inline, kernel
@@ -157,7 +157,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk, scratch = new_walk(rays), new_scratch(rays)
     data = table.data
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, SPREAD)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from rtcore.walk import ACTIVE, PACKET, SPREAD, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vector
 from rtcore.expansions import LONG, expand
@@ -168,7 +168,7 @@ def settle(rays, i, p, exact, q, side, opacity):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, SPREAD)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

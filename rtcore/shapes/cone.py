@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.across import lowest_bit
-from rtcore.walk import ACTIVE, NARROW, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.expansions import LONG, NOISE, clear, expand, put_products
 from rtcore.fields import FieldError, Flag, Number, Vec, Vector
@@ -287,7 +287,7 @@ def settle_cap(rays, i, p, table, q, end, opacity):
 def intersect(rays, n, tree, table, first, opacity):
     walk, where, exact = new_walk(rays), opacity.shape[0] == 0, table.exact
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, NARROW)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.across import lowest_bit
-from rtcore.walk import ACTIVE, PACKET, SPREAD, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import moved, parts, rationals
 from rtcore.fields import FieldError, Vec, Vectors
 from rtcore.indices import among, common, rows_of
@@ -143,7 +143,7 @@ def in_outline_closely(ray, i, exact, q, extra, first, count, a, b):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, SPREAD)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

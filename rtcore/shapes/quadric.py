@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.directions import normalized
-from rtcore.walk import ACTIVE, PACKET, SPREAD, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
+from rtcore.walk import ACTIVE, PACKET, begin, leaf_end, leaf_first, new_walk, next_leaf, shrink
 from rtcore.exact import inverse_parts, moved, parts, rationals
 from rtcore.fields import FieldError, Maybe, Numbers, Vec, Vector
 from rtcore.indices import among, common, pick, pick3, rows_of
@@ -84,7 +84,7 @@ def moved_form(coefficients, middle, half) -> list[Fraction]:
 def intersect(rays, n, tree, table, first, opacity):
     walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30, SPREAD)
+        begin(walk, rays, start, n, tree, 1 << 30)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

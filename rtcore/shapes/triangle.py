@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from rtcore.directions import normalized
-from rtcore.walk import ACTIVE, PACKET, SPREAD, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
+from rtcore.walk import ACTIVE, PACKET, TOP, begin, leaf_end, leaf_first, new_walk, next_leaf, only_ray, shrink
 from rtcore.across import lowest_bit
 from rtcore.fields import Field, FieldError, Maybe, Text, Vec, Vector, Vectors
 from rtcore.indices import among, common, flagged, pick3, put3, rows_of
@@ -214,7 +214,7 @@ def intersect(rays, n, tree, table, first, opacity):
     slant, axes = np.empty((4, PACKET), rays.ray.dtype), np.empty(PACKET // 8, np.int64)
     tiny = TINY32 if rays.ray.itemsize == 4 else TINY64
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 2048, SPREAD)
+        begin(walk, rays, start, n, tree, 2048)
         if walk.state[TOP] == 0:
             continue
         every = shear(rays, start, n, slant, axes)
