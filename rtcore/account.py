@@ -18,7 +18,8 @@ LIGHT_WORDS = {"spherelight": "spherical", "rectanglelight": "rectangular"}
 WORDS = {"primary rays": "casting the eye's rays", "depth of field": "the lens", "pixel filter": "placing samples by the filter",
          "surface at the hits": "points and normals where they hit",
          "reflected and refracted rays": "sending reflected and refracted rays on",
-         "glossy reflection": "scattering them at rough surfaces", "film": "adding up the samples"}
+         "ray sorting": "sorting rays that scatter", "glossy reflection": "scattering them at rough surfaces",
+         "film": "adding up the samples"}
 TOLD = 3        # stages that a sentence names
 
 

@@ -34,6 +34,7 @@ def _examples(dtype) -> dict[str, tuple]:
         "glows": (wave, 0, look, beam.answer), "shines": shine, "shines sampled": (*shine, Draw(none, none, 0, 0)),
         "notes lit": (film, beam, 0, none, np.float32(1)), "gathers": (wave, beam, 0), "dims": (wave, 0, fogs.numbers(Fog())),
         "deposits": (wave, 0, np.zeros((3, 0), np.float32), True), "bounces": (wave, 0, look, wave, np.zeros(0, np.int64)),
+        "sorts": (wave.rays, 0, wave), "tells": (wave.rays, wave, 0),
         "commits": (film, np.zeros((3, 0), np.float32), 0, none)}
 
 
@@ -45,6 +46,6 @@ def address(kernel, sort: str, dtype, table: Table | None = None) -> int:
     key = kernel, dtype
     if key not in ADDRESSES:
         like = tuple(table if table is not None and isinstance(value, Table) else value for value in _examples(dtype)[sort])
-        counts = sort.startswith("shines") or sort in ("sends", "sends list", "gathers", "bounces", "commits")
+        counts = sort.startswith("shines") or sort in ("sends", "sends list", "gathers", "bounces", "sorts", "commits")
         ADDRESSES[key] = address_of(kernel, like, types.int64 if counts else types.none)
     return ADDRESSES[key]

@@ -68,6 +68,15 @@ def rows_of(tc, array, i, first, mask):
 
 
 @intrinsic
+def store_whole(tc, array, i, x):
+    """array[i .. i+7] = the lanes x, which are whole numbers; int32 array."""
+    def gen(ctx, b, sig, a):
+        b.store(b.fptosi(a[2], WHOLE), place_of(ctx, b, sig, a, I32, LANES), align=4)
+        return ctx.get_dummy_value()
+    return types.void(array, types.intp, x), gen
+
+
+@intrinsic
 def chosen(tc, array, index):
     """array[index] in every lane; 1-D int32 array."""
     def gen(ctx, b, sig, a):

@@ -12,12 +12,15 @@ from rtcore.scene import Light, Material, Scene
 from rtcore.settings import Settings
 from rtcore.shapes import KIND_MODULES
 from rtcore.shapes.kind import Kind
+from rtcore.sorting import WORTH
 from rtcore.views import VIEWS
 
 VIEW = {view.name: view for view in VIEWS}
 NO_LIGHT = "the view shows first hits only"
 FIRST_SAMPLE = "a pixel's first sample goes through the middle of the lens"
 CENTRE = "a pixel's first sample is its centre"
+NO_BOUNCES = "no reflected or refracted rays are followed"
+FEW_SHAPES = f"there are fewer than {WORTH} of each shape, or so many that rays that scatter are walked singly"
 SMOOTH = "no visible material is rough and reflects or transmits"
 GLOW = "background and ambient light"
 
@@ -33,6 +36,7 @@ class Plan(NamedTuple):
     ambient: np.ndarray             # (3,) the sum of those that are everywhere
     shadows: bool
     bounces: bool
+    sorting: bool
     fog: bool
     lens: bool
     gloss: bool
@@ -112,9 +116,12 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
     bounces = _keep(stages, out, "reflected and refracted rays", [
         (lit, NO_LIGHT), (settings.reflections, "switched off"), (settings.max_depth > 1, "the depth is 1: eye rays only"),
         (any(m.reflection > 0 or m.transmission > 0 for m in materials), "no visible material reflects or transmits")])
+    sorting = _keep(stages, out, "ray sorting", [
+        (bounces, NO_BOUNCES),
+        (any(WORTH <= count < kind.singly and kind.bounds is not None for kind, count in counts.items()), FEW_SHAPES)])
     gloss = _keep(stages, out, "glossy reflection", [
         (lit, NO_LIGHT), (any(m.roughness > 0 and (m.reflection > 0 or m.transmission > 0) for m in materials), SMOOTH),
-        (bounces, "no reflected or refracted rays are followed"), (settings.samples > 1, "a pixel's first sample takes the smooth way")])
+        (bounces, NO_BOUNCES), (settings.samples > 1, "a pixel's first sample takes the smooth way")])
     _keep(stages, out, "further samples", [(lit, NO_LIGHT), (settings.samples > 1, "one sample per pixel was asked for")])
     stages.append("film")
     kinds = tuple(sorted(counts, key=lambda k: k.name))
@@ -123,15 +130,16 @@ def plan(scene: Scene, settings: Settings, camera: Camera | None = None) -> Plan
               "doubt": any(kind.doubtful for kind in kinds),
               "leaf": any(kind.bounds is not None for kind in kinds), "tree": any(stage.startswith("tree: ") for stage in stages),
               **{kind.name: True for kind in kinds}, **{f"textbook-{name}": textbook for name in plain},
-              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "gloss": gloss, "filter": shaped,
+              **{f"light-{word}": True for word in casting}, "lit": lights, "fog": fog, "bounce": bounces, "sorting": sorting,
+              "gloss": gloss, "filter": shaped,
               "adaptive": "further samples" in stages and (settings.adaptive or "adaptive" in VIEW[settings.view].kernels),
               "recast": "recast" in VIEW[settings.view].kernels}
     names = [name for name, needed in wanted.items() if needed]
     assert all(type(light) in SHINE for light in lights)
     kernels = tuple(f"{name}.{settings.precision}" for name in names)
     samples = settings.samples if lit else 1
-    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, fog, lens, gloss, shaped, smooth, textbook,
-                samples)
+    return Plan(tuple(stages), tuple(out), kernels, kinds, lights, ambient, shadows, bounces, sorting, fog, lens, gloss, shaped, smooth,
+                textbook, samples)
 
 
 def _keep(stages: list, out: list, stage: str, needs: list) -> bool:

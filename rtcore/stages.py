@@ -54,13 +54,13 @@ MEETS, SURFACE, FIRST_PRIM = range(3)
 #: Columns of Program.lamps.
 SHINES, SAMPLED = range(2)
 #: Places in Program.stages: 0 where there is no such stage.
-(SENDS, SENDS_LIST, FINDS, NOTES, GLOWS, NOTES_LIT, GATHERS, DIMS, DEPOSITS, BOUNCES, COMMITS, SHADOWED, DOUBTS, ROUGH,
- LASTS, NUMBERED, SPREADS) = range(17)
-STAGES = 17
+(SENDS, SENDS_LIST, FINDS, NOTES, GLOWS, NOTES_LIT, GATHERS, DIMS, DEPOSITS, BOUNCES, SORTS, TELLS, COMMITS, SHADOWED, DOUBTS, ROUGH,
+ LASTS, NUMBERED, SPREADS) = range(19)
+STAGES = 19
 
 #: Where time goes (`clock.Clock.measure`): these, then two for each lamp, for each kind of shapes three.
-PRIMARY_RAYS, FILM, GLOWING, DIMMING, DEPOSITING, ONWARD = range(6)
-LAPS = 6
+PRIMARY_RAYS, FILM, GLOWING, DIMMING, DEPOSITING, ONWARD, SORTING = range(7)
+LAPS = 7
 
 
 class Primitives(NamedTuple):
@@ -273,11 +273,21 @@ def advance(program, state, film, todo):
             for i in range(n):
                 rays.doubt[i] = 0       # only kinds that can doubt write it
         elif step == MEET:
+            sorts = depth > 1 and s[KNOWN] < n and stages[SORTS] != 0
+            if sorts and child.owner.shape[0] < n:
+                return ROOM
             s[STEP] = SURFACES
             if s[KNOWN] < n:
-                since = _meet(program, state, rays, n, program.look.opacity[:0], hits, since)
+                met, m = rays, n
+                if sorts:       # what the wave has come from is not needed any more
+                    met, m = child.rays, count_of(stages[SORTS], (rays, n, child))
+                    since = _lap(spent, SORTING, since)
+                since = _meet(program, state, met, m, program.look.opacity[:0], hits, since)
                 if since == 0:
                     return STALE
+                if sorts:
+                    call(stages[TELLS], (rays, child, m))
+                    since = _lap(spent, SORTING, since)
                 if s[RECALLING] != 0:
                     return KEEP_HITS
         elif step == SURFACES:

@@ -20,6 +20,7 @@ from rtcore.plan import GLOW, VIEW, Plan
 from rtcore.scene import Background, Fog
 from rtcore.scratch import Scratch
 from rtcore.settings import Settings
+from rtcore.sorting import sort_rays, tell_hits
 from rtcore.stages import (CAREFUL, CASTING, DEPTH, EYES, KEEPING, KEEPING_ROWS, KNOWN, KNOWN_SHADOWS, LAMP, LAST_LAMP, NOTING, PRIMARY,
                            PRIMARY_HITS, RAYS, REACHED, REFLECTION, REFRACTION, SHADOW_HITS, TILE, WHOLE, Lamp, Program, State, advance)
 from rtcore.todo import Todo
@@ -28,7 +29,7 @@ from rtcore.wave import Wave, find_kinds
 #: What time is counted to: stages of the plan and groups of kernels.
 CAST, SPREAD, BEND = ("primary rays", "core"), ("pixel filter", "filter"), ("depth of field", "lens")
 FILM, DEPOSIT, DIM, GLOWING = ("film", "core"), ("film", "glow"), ("fog", "fog"), (GLOW, "glow")
-ONWARD, ROUGHEN = ("reflected and refracted rays", "bounce"), ("glossy reflection", "gloss")
+ONWARD, SORT, ROUGHEN = ("reflected and refracted rays", "bounce"), ("ray sorting", "sorting"), ("glossy reflection", "gloss")
 SHADOWS = ("shadow rays", "lit")
 
 
@@ -77,7 +78,8 @@ class Tracer:
                   (stages.GLOWS, shading.glow, "glows", bright), (stages.GATHERS, shading.gather, "gathers", plan.lights),
                   (stages.NOTES_LIT, films.note_lit, "notes lit", lit and plan.lights),
                   (stages.DIMS, fogs.dim, "dims", plan.fog), (stages.DEPOSITS, films.deposit, "deposits", bright),
-                  (stages.BOUNCES, shading.bounce, "bounces", plan.bounces), (stages.COMMITS, films.commit, "commits", not signed)]
+                  (stages.BOUNCES, shading.bounce, "bounces", plan.bounces), (stages.SORTS, sort_rays, "sorts", plan.sorting),
+                  (stages.TELLS, tell_hits, "tells", plan.sorting), (stages.COMMITS, films.commit, "commits", not signed)]
         chosen = np.zeros(stages.STAGES, np.int64)
         for place, kernel, sort, needed in wanted:
             chosen[place] = address(kernel, sort, dtype) if needed else 0
@@ -91,7 +93,7 @@ class Tracer:
 
     def _named(self) -> tuple[tuple[str, str], ...]:
         """What the ticks of `stages.advance` are for."""
-        names = [CAST, FILM, GLOWING, DIM, DEPOSIT, ONWARD]
+        names = [CAST, FILM, GLOWING, DIM, DEPOSIT, ONWARD, SORT]
         for light in self.plan.lights:
             name = type(light).__name__.lower()
             names += [(f"light: {name}", f"light-{name}"), (f"light: {name}", "lit")]
@@ -163,6 +165,8 @@ class Tracer:
         if wanted == stages.ROOM:
             if numbers[stages.STEP] == stages.SEND:
                 scratch.primary(int(todo.tiles[numbers[TILE], 2:4].prod()))
+            elif numbers[stages.STEP] == stages.MEET:
+                scratch.wave(depth, n)
             elif numbers[stages.STEP] == stages.BOUNCE:
                 scratch.wave(depth, 2 * n)
             else:

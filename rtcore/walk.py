@@ -72,8 +72,8 @@ def new_walk(rays):
 
 @inline
 def begin(walk, rays, start, n, tree, singly):
-    """Bring the packet of rays start .. min(start + 64, n) to the tree's root; none of them once they are not wanted any more. singly: how
-    many nodes a tree must have for rays that scatter to be walked singly, which costs less where nodes come from memory."""
+    """Bring the packet of rays start .. min(start + 64, n) to the tree's root; none of them once they are not wanted any more. singly:
+    whether rays that scatter are walked singly, which costs less in a tree so large that nodes come from memory."""
     eps = 2.0 ** -20 if rays.ray.itemsize == 4 else 2.0 ** -49      # 8 roundings of the ray's precision
     frame, coarse, fine, state, box = tree.frame, walk.coarse, walk.fine, walk.state, tree.box
     alone = box.shape[0] > 0 and tree.link[LINK, 0] < 0 and box[0, 1] > box[3, 1]
@@ -136,7 +136,7 @@ def begin(walk, rays, start, n, tree, singly):
         x0, x1 = least(x0, select(meets, dx, two)), greatest(x1, select(meets, dx, -two))
         y0, y1 = least(y0, select(meets, dy, two)), greatest(y1, select(meets, dy, -two))
         z0, z1 = least(z0, select(meets, dz, two)), greatest(z1, select(meets, dz, -two))
-    state[TOP], state[WAITING], state[ALIVE] = 0, waiting, alive
+    state[TOP], state[FLOOR], state[WAITING], state[ALIVE] = 0, -1, waiting, alive
     if alive == 0 or box.shape[0] == 0:
         state[MODE] = BEAM
     elif alone:
@@ -145,10 +145,10 @@ def begin(walk, rays, start, n, tree, singly):
         # the axis along which all rays go the same way, and furthest
         along_x, along_y, along_z = common(x0, x1), common(y0, y1), common(z0, z1)
         axis = 0 if along_x >= along_y and along_x >= along_z else 1 if along_y >= along_z else 2
-        state[MODE], large = BEAM, NODE * singly <= tree.link.shape[0]
+        state[MODE] = BEAM
         straight = max(along_x, max(along_y, along_z)) >= STRAIGHT
-        if not straight or not bundle(coarse, walk.beam, state, axis, largest(fuzz), groups, WIDE if large else SPREAD):
-            if large:
+        if not straight or not bundle(coarse, walk.beam, state, axis, largest(fuzz), groups, WIDE if singly else SPREAD):
+            if singly:
                 state[MODE], state[RUNNING] = SINGLY, SLOTS
                 for k in range(SLOTS):
                     walk.slots[k, 0], walk.slots[k, 1] = 0, 0
@@ -156,7 +156,7 @@ def begin(walk, rays, start, n, tree, singly):
                 state[MODE] = SOME
         some = lowest_bit(waiting)
         state[OCTANT] = (coarse[WAY, some] < 0) + 2 * (coarse[WAY + 1, some] < 0) + 4 * (coarse[WAY + 2, some] < 0)
-        walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP], state[FLOOR] = -1, 0, alive, 1, -1
+        walk.stack[0, 0], walk.entry[0, 0], walk.mask[0], state[TOP] = -1, 0, alive, 1
         if state[MODE] == SOME:
             walk.stack[0, 0], walk.mask[0], state[FLOOR] = 0, waiting, 0
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rtcore import adaptive, bvh, eye, film as films, filters, fog as fogs, gloss, jit, lens, recast, rows, shading
+from rtcore import adaptive, bvh, eye, film as films, filters, fog as fogs, gloss, jit, lens, recast, rows, shading, sorting
 from rtcore.camera import Camera
 from rtcore.flatten import DTYPES, flatten
 from rtcore.keep import Memory, Recall
@@ -159,6 +159,11 @@ def _bounce(dtype):
     shading.bounce(wave, n, _look(), new_wave(2 * n, dtype), np.zeros(len(COUNTS), np.int64))
 
 
+def _sorting(dtype):
+    (wave, _, n), room = _wave(dtype), new_wave(64, dtype)
+    sorting.tell_hits(wave.rays, room, sorting.sort_rays(wave.rays, n, room))
+
+
 def _gloss(dtype):
     wave, target, n = _wave(dtype)
     gloss.roughen(wave, new_wave(n, dtype), 0, _look(), target, target, target, target, 0)
@@ -200,6 +205,7 @@ GROUPS: dict[str, tuple[tuple[str, ...], Callable]] = {
     "leaf": (("rtcore.bvh",), _leaf), "tree": (("rtcore.bvh",), _tree), "lit": (("rtcore.shading",), _lit),
     "bounce": (("rtcore.shading",), _bounce), "lens": (("rtcore.lens",), _lens), "fog": (("rtcore.fog",), _fog),
     "rows": (("rtcore.rows",), _rows), "keep": (("rtcore.film", "rtcore.levels"), _keep), "gloss": (("rtcore.gloss",), _gloss),
+    "sorting": (("rtcore.sorting",), _sorting),
     "filter": (("rtcore.filters",), _filter), "adaptive": (("rtcore.adaptive",), _adaptive),
     "recast": (("rtcore.film", "rtcore.recast"), _recast),
     **{f"light-{light.__name__.lower()}": ((light.__module__,), _light(light)) for light in SHINE},

@@ -21,9 +21,9 @@ DARK = (Point(position=(1, 9, 2), intensity=0), Directional(direction=(1, -2, 0.
 
 
 def full_plan(scene, settings, camera=None):
-    """Everything runs: lights that bring nothing, their shadow rays, fog, bounces."""
+    """Everything runs: lights that bring nothing, their shadow rays, fog, bounces, which are sorted."""
     composed = plan(scene, settings, camera)
-    return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True, gloss=True)
+    return composed._replace(lights=(*composed.lights, *DARK), shadows=True, fog=True, bounces=True, sorting=True, gloss=True)
 
 
 def full_geometry(scene, precision="f64", previous=None, give_way=None) -> Geometry:
@@ -105,10 +105,12 @@ def test_same_bits_as_the_full_pipeline(path, precision, all_on):
     ran = {stage for stage, _ in whole.seconds}
     assert ran >= {"fog", "shadow rays", "reflected and refracted rays", "light: point", "light: directional",
                    *(f"hits: {kind.name}" for kind in KINDS)}
+    assert ("ray sorting" in ran) == (whole.rays["reflection"] + whole.rays["refraction"] > 0)
 
 
 def test_the_gallery_leaves_out_each_kind_of_thing():
     """Else the test above would prove little."""
     left = [dict(plan(load(path), Settings()).left_out) for path in SCENES]
-    for stage in ("fog", "reflected and refracted rays", "patterns", "smooth normals", *(f"hits: {kind.name}" for kind in KINDS)):
+    for stage in ("fog", "reflected and refracted rays", "ray sorting", "patterns", "smooth normals",
+                  *(f"hits: {kind.name}" for kind in KINDS)):
         assert any(stage in out for out in left), stage

@@ -53,7 +53,7 @@ def test_every_stage_is_kept_or_left_out_with_a_reason(name):
     assert set(result.kernels) <= set(ALL)
     assert {stage for stage in (*result.stages, *left) if stage.startswith("hits: ")} == {f"hits: {kind.name}" for kind in KINDS}
     for stage in ("textbook formulas", "pixel filter", "depth of field", "shadow rays", "smooth normals", "patterns", "fog",
-                  "reflected and refracted rays", "glossy reflection", "further samples"):
+                  "reflected and refracted rays", "ray sorting", "glossy reflection", "further samples"):
         assert (stage in result.stages) != (stage in left)
     stats = rtcore.render(made, (8, 6), **{"spp" if k == "samples" else k: v for k, v in settings.items()}).stats
     assert stats["stages"] == list(plan(made, Settings(**{"samples": 1, **settings})).stages)
@@ -64,6 +64,7 @@ def test_reasons_are_the_right_ones():
         f"tree: {kind.name}": "they are unbounded" if kind.bounds is None else "only 1: each is tested"
         for kind in KINDS if kind.name not in ("sphere", "triangle")} | {
             "depth of field": "the camera is a pinhole", "pixel filter": "with a box, samples lie evenly in their pixel",
+            "ray sorting": "there are fewer than 400 of each shape, or so many that rays that scatter are walked singly",
             "glossy reflection": "no visible material is rough and reflects or transmits", "textbook formulas": "hits are to be certain"}
     off = dict(plan(*(VARIANTS["switched off"][0], Settings(shadows=False, fog=False, reflections=False))).left_out)
     assert off["shadow rays"] == off["fog"] == off["reflected and refracted rays"] == "switched off"
@@ -95,6 +96,7 @@ def with_more(made: Scene, *objects, **fields) -> Scene:
 
 FLOOR = scene(Plane((0, 0, 0), (0, 1, 0)))
 ONE_COLOUR = Material(checker=Checker(even=(0.8,) * 3, odd=(0.8,) * 3))
+POLISHED = scene(*(Node(shape=Sphere((i - 2, 0, 0), 0.6), material=MIRROR) for i in range(5)))
 FACE = [(-2, -1, 1), (2, -1, 1), (0, 2, 1)], [(0, 2, 1)]
 
 #: (scene without, settings), (scene where the stage is there but has no effect, settings), the stage in question
@@ -113,6 +115,9 @@ PAIRS = {
     "a tree": (
         (scene(), {}), (with_more(scene(), *(Node(shape=Sphere((i, 0, 0), 0.3), transform=[BEHIND]) for i in range(9))), {}),
         "tree: sphere"),
+    "a crowd that no ray meets": (
+        (POLISHED, {}), (with_more(POLISHED, *(Node(shape=Sphere((i, 0, 0), 0.3), transform=[BEHIND]) for i in range(400))), {}),
+        "ray sorting"),
     "smooth normals along the flat ones": (
         (scene(Mesh(*FACE)), {}), (scene(Mesh(*FACE, normals=[(0, 0, -1)] * 3)), {}), "smooth normals"),
 }

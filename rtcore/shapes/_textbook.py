@@ -32,7 +32,7 @@ def meet(rays, i, p, f, d, square, side, opacity):
 def intersect_sphere(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
@@ -50,7 +50,7 @@ def intersect_sphere(rays, n, tree, table, first, opacity):
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk, data = new_walk(rays), table.data
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -157,7 +157,7 @@ def intersect(rays, n, tree, table, first, opacity):
     walk, scratch = new_walk(rays), new_scratch(rays)
     data = table.data
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -287,7 +287,7 @@ def settle_cap(rays, i, p, table, q, end, opacity):
 def intersect(rays, n, tree, table, first, opacity):
     walk, where, exact = new_walk(rays), opacity.shape[0] == 0, table.exact
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

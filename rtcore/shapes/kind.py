@@ -53,6 +53,7 @@ class Kind:
     bounds: Callable | None
     example: tuple[Shape, tuple]        # a shape and transforms that become this kind, to compile the kernels with
     leaf_most: int = 4
+    singly: int = 1 << 30               # from how many on rays that scatter are walked singly, see `walk.begin`
     doubtful: bool = False              # its hits may lack a proof; then it writes Rays.doubt
     lasting: bool = False               # its surface rows take far longer than looking them up: the live picture keeps them
     shared_extra: bool = False          # extra is no row per primitive: data's last two columns are its first row and its length

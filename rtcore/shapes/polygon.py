@@ -143,7 +143,7 @@ def in_outline_closely(ray, i, exact, q, extra, first, count, a, b):
 def intersect(rays, n, tree, table, first, opacity):
     walk = new_walk(rays)
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

@@ -84,7 +84,7 @@ def moved_form(coefficients, middle, half) -> list[Fraction]:
 def intersect(rays, n, tree, table, first, opacity):
     walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

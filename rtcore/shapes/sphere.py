@@ -137,7 +137,7 @@ def settle_sphere(rays, i, p, table, q, opacity):
 def intersect(rays, n, tree, table, first, opacity):
     walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):
@@ -234,7 +234,7 @@ def settle_ellipsoid(rays, i, p, table, q, opacity):
 def intersect_ellipsoid(rays, n, tree, table, first, opacity):
     walk, where = new_walk(rays), opacity.shape[0] == 0
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 1 << 30)
+        begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             for q in range(leaf_first(leaf), leaf_end(leaf)):

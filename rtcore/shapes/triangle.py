@@ -24,6 +24,7 @@ from rtcore.wave import DX, NX, OX, SLOW, record, record_one
 
 #: Twice a triangle's area, seen along the ray, below which products may have lost digits to underflow.
 TINY32, TINY64 = 2.0 ** -100, 2.0 ** -900
+SINGLY = 20_000         # triangles, see `Kind.singly`: some 2,000 nodes
 
 
 class Triangle(Shape, frozen=True):
@@ -214,7 +215,7 @@ def intersect(rays, n, tree, table, first, opacity):
     slant, axes = np.empty((4, PACKET), rays.ray.dtype), np.empty(PACKET // 8, np.int64)
     tiny = TINY32 if rays.ray.itemsize == 4 else TINY64
     for start in range(0, n, PACKET):
-        begin(walk, rays, start, n, tree, 2048)
+        begin(walk, rays, start, n, tree, table.side.shape[0] >= SINGLY)
         if walk.state[TOP] == 0:
             continue
         every = shear(rays, start, n, slant, axes)
@@ -311,4 +312,4 @@ def _bounds(data, extra):
     return low, high
 
 
-TRIANGLE = Kind("triangle", intersect, surface, _bounds, (Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), ()))
+TRIANGLE = Kind("triangle", intersect, surface, _bounds, (Triangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), ()), singly=SINGLY)
