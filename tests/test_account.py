@@ -60,6 +60,7 @@ def test_sentences():
         "Patterns are left out: no visible material has one.",
         "Fog is left out: the scene has none.",
         "Reflected and refracted rays are left out: no visible material reflects or transmits.",
+        "Ray sorting is left out: no reflected or refracted rays are followed.",
         "Glossy reflection is left out: no visible material is rough and reflects or transmits."]
     dark = sentences(account(plan(Scene(lights=[]), Settings()), {}, {}))
     assert dark[0].startswith(f"It shows no shapes and needs no kernel of the {len(KINDS)} kinds")
