@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rtcore.jit import kernel
+from rtcore.memory import carved
 
 WIDTH = 8               # children of a node, and primitives in a leaf, at most
 BINS = 16
@@ -243,9 +244,7 @@ def build(low: np.ndarray, high: np.ndarray, leaf_most: int) -> tuple[Tree, np.n
 
 def _lines(rows: int) -> np.ndarray:
     """(rows, 8) int32, nodes at the start of cache lines."""
-    room = np.empty(rows * WIDTH + 16, np.int32)
-    skip = -room.ctypes.data % 64 // 4
-    return room[skip:skip + rows * WIDTH].reshape(rows, WIDTH)
+    return carved(((rows, WIDTH), np.int32))[0]
 
 
 def leaf_range(link: int) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from rtcore.bvh import EMPTY_TREE, Tree, build
 from rtcore.fields import FieldError
 from rtcore.latest import leaves_of
 from rtcore.leaves import Leaf, same_place
+from rtcore.memory import carved
 from rtcore.scene import Scene
 from rtcore.shapes.kind import MIRRORED, SIDES, Kind, Packed, Table
 
@@ -159,8 +160,10 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         data, owner, side, exact = data[order], owner[order], side[order], exact[order]
         if len(extra) and not kind.shared_extra:
             extra = extra[order]
-    table = Table(np.ascontiguousarray(data, dtype), np.ascontiguousarray(extra, np.float64 if kind.shared_extra else dtype), side,
-                  np.ascontiguousarray(exact))
+    wanted = (data, dtype), (extra, np.float64 if kind.shared_extra else dtype), (side, np.int8), (exact, np.float64)
+    table = Table(*carved(*((a.shape, kept) for a, kept in wanted)))
+    for kept, (a, _) in zip(table, wanted):
+        kept[:] = a
     kept = {index: p for index, p in packs if len(p.data) <= FEW} if len(packs) <= MANY else {}
     return Group(kind, tree, table, 0, has_tree, key, owner, order, kept, sum(p.dropped for _, p in packs))
 

@@ -13,9 +13,11 @@ ALIGNED = 64        # bytes at which arrays cut from one piece begin: a line of 
 
 
 def room(size: int) -> np.ndarray:
-    """So many bytes with nothing set, uint8."""
+    """So many bytes with nothing set, uint8, that begin with a line of the cache."""
     if size < LEAST or not hasattr(mmap, "MADV_HUGEPAGE"):      # not on Linux
-        return np.empty(size, np.uint8)
+        piece = np.empty(size + ALIGNED, np.uint8)
+        skip = -piece.ctypes.data % ALIGNED
+        return piece[skip:skip + size]
     piece = mmap.mmap(-1, -(-size // PAGE) * PAGE, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     with contextlib.suppress(OSError):      # a system that has none: then it is memory as any
         piece.madvise(mmap.MADV_HUGEPAGE)
