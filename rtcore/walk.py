@@ -168,14 +168,15 @@ def _reach(far, speed, enter):
 
 
 @inline
-def shrink(walk, rays, start):
-    """After a leaf: the active vectors need not look past what they hit."""
-    coarse, active = walk.coarse, walk.state[ACTIVE]
-    if walk.state[MODE] == ALONE:
+def shrink(walk, rays, start, touched):
+    """After a leaf: the vectors `touched`, as bits, which may have hit something, need not look past it. Most leaves are met for nothing;
+    to have all active ones look took 1 % of the time of a flake of 7,381 spheres, 5 % of one of 66,430."""
+    coarse = walk.coarse
+    if walk.state[MODE] == ALONE or touched == 0:
         return
-    while active:
-        g = lowest_bit(active)
-        active &= active - 1
+    while touched:
+        g = lowest_bit(touched)
+        touched &= touched - 1
         reach = _reach(load(rays.ray, T, start + g * 8), load(walk.fine, 1, g * 8), load(walk.fine, 0, g * 8))
         store(coarse, REACH, g * 8, least(load(coarse, REACH, g * 8), reach))
     if walk.state[MODE] == BEAM:

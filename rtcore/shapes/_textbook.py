@@ -42,7 +42,7 @@ def intersect_sphere(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         f = load3(rays.ray, OX, i) - splat3(table.data, q, 0)
                         meet(rays, i, first + q, f, load3(rays.ray, DX, i), radius * radius, table.side[q], opacity)
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, walk.state[ACTIVE])
             leaf = next_leaf(walk, tree, table)
 
 
@@ -59,5 +59,5 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         f = into(data, q, load3(rays.ray, OX, i) - splat3(data, q, 0))
                         meet(rays, i, first + q, f, into(data, q, load3(rays.ray, DX, i)), 1, table.side[q], opacity)
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, walk.state[ACTIVE])
             leaf = next_leaf(walk, tree, table)

@@ -180,7 +180,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             settle(rays, i + lowest(late), first + q, table.exact, q, scratch.element, count, threshold, table.side[q],
                                    opacity)
                             late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, walk.state[ACTIVE])
             leaf = next_leaf(walk, tree, table)
 
 

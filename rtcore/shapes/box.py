@@ -171,6 +171,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most = np.float64(table.data[q, OWN])
                 for g in range(PACKET // 8):
@@ -178,13 +179,14 @@ def intersect(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         todo = approach(rays.ray, i, table.exact, q, most)
                         if any_lane(todo):
+                            touched |= 1 << g
                             t, ok, unsure = meet(rays.ray, i, table.exact, q, most, todo, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
                             late = bits(unsure)
                             while late:
                                 settle(rays, i + lowest(late), first + q, table.exact, q, table.side[q], opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

@@ -290,6 +290,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most, even, limit, caps, side = exact[q, MOST], exact[q, EVEN], exact[q, LIMIT], exact[q, CAPS], table.side[q]
                 active = walk.state[ACTIVE]
@@ -300,6 +301,7 @@ def intersect(rays, n, tree, table, first, opacity):
                     todo = may_meet(near) & alive(rays.ray, i)
                     late = 0
                     if any_lane(todo):
+                        touched |= 1 << (i - start) // 8
                         t, found, unsure = _second.meet(rays.ray, i, exact, q, most, even, IN_SLAB, limit, todo, near, side, where)
                         record(rays, i, first + q, t, found, opacity)
                         late = bits(unsure)
@@ -310,13 +312,14 @@ def intersect(rays, n, tree, table, first, opacity):
                         if caps == cap + 1 or caps == 3:
                             todo = near_cap(rays.ray, i, exact, q, even, near, cap - 0.5)
                             if any_lane(todo):
+                                touched |= 1 << (i - start) // 8
                                 t, found, unsure = meet_cap(rays.ray, i, exact, q, most, even, cap - 0.5, todo, near, side)
                                 record(rays, i, first + q, t, found, opacity)
                                 late = bits(unsure)
                             while late:
                                 settle_cap(rays, i + lowest(late), first + q, table, q, cap - 0.5, opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

@@ -179,7 +179,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         if opacity.shape[0] == 0:
                             note_doubt(rays, i, first + q, found, doubt, m)
                         m += 8
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, walk.state[ACTIVE])
             leaf = next_leaf(walk, tree, table)
 
 

@@ -146,6 +146,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 drop, begins, count = int(table.data[q, DROP]), int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 active = walk.state[ACTIVE]
@@ -161,13 +162,14 @@ def intersect(rays, n, tree, table, first, opacity):
                             inside = inside & ~near | closely & near
                         todo = todo & inside
                     if any_lane(todo):
+                        touched |= 1 << (i - start) // 8
                         s, hit, unsure = meet(rays.ray, i, table.exact, q, todo, table.side[q])
                         record(rays, i, first + q, s, hit, opacity)
                         late = bits(unsure)
                         while late:
                             settle(rays, i + lowest(late), first + q, table, q, opacity)
                             late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

@@ -218,6 +218,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 begins, count = int(table.data[q, FIRST]), int(table.data[q, COUNT])
                 for g in range(PACKET // 8):
@@ -225,9 +226,10 @@ def intersect(rays, n, tree, table, first, opacity):
                         i = start + g * 8
                         near = may_meet(rays.ray, i, table.exact, q, table.extra, begins, count)
                         if any_lane(near[0]):
+                            touched |= 1 << g
                             t, ok = hit_solid(rays.ray, i, table.exact, q, table.extra, begins, count, near, table.side[q])
                             record(rays, i, first + q, t, ok, opacity)
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

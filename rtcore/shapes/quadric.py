@@ -87,6 +87,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 most, curved = np.float64(table.data[q, MOST]), np.float64(table.data[q, MOST + 1])
                 for g in range(PACKET // 8):
@@ -95,13 +96,14 @@ def intersect(rays, n, tree, table, first, opacity):
                         near = approach(rays.ray, i, table.exact, q, most, curved)
                         todo = may_meet(near) & alive(rays.ray, i)
                         if any_lane(todo):
+                            touched |= 1 << g
                             t, found, unsure = meet(rays.ray, i, table.exact, q, most, 0.0, IN_BOX, 2.0, todo, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
                                 settle(rays, i + lowest(late), first + q, table, q, IN_BOX, opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

@@ -140,6 +140,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 active = walk.state[ACTIVE]
                 while active:
@@ -149,13 +150,14 @@ def intersect(rays, n, tree, table, first, opacity):
                         far, near, gone = approach(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i) & ~gone
                         if any_lane(todo):
+                            touched |= 1 << (i - start) // 8
                             t, found, unsure = meet(rays.ray, i, table.data, table.exact, q, todo, far, near, table.side[q], where)
                             record(rays, i, first + q, t, found, opacity)
                             late = bits(unsure)
                             while late:
                                 settle_sphere(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 
@@ -237,6 +239,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 active = walk.state[ACTIVE]
                 while active:
@@ -246,6 +249,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                         far, near, gone = approach_ellipsoid(rays.ray, i, table.data, table.exact, q)
                         todo = may_meet(near) & alive(rays.ray, i) & ~gone
                         if any_lane(todo):
+                            touched |= 1 << (i - start) // 8
                             side = table.side[q]
                             t, found, unsure = meet_ellipsoid(rays.ray, i, table.data, table.exact, q, todo, far, near, side, where)
                             record(rays, i, first + q, t, found, opacity)
@@ -253,7 +257,7 @@ def intersect_ellipsoid(rays, n, tree, table, first, opacity):
                             while late:
                                 settle_ellipsoid(rays, i + lowest(late), first + q, table, q, opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

@@ -86,6 +86,7 @@ def intersect(rays, n, tree, table, first, opacity):
         begin(walk, rays, start, n, tree, False)
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
+            touched = 0
             for q in range(leaf_first(leaf), leaf_end(leaf)):
                 for g in range(PACKET // 8):
                     i = start + g * 8
@@ -97,6 +98,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             course = isolate(todo, f, d, near, far, exact[q, RADII], exact[q, RADII + 1])
                             todo = may_cross(todo, course)
                             if any_lane(todo):
+                                touched |= 1 << g
                                 f1, v, v1 = f, d, d
                                 if table.data.itemsize == 8:
                                     f, f1, v, v1 = line_in_pairs(rays.ray, i, exact, q)
@@ -109,7 +111,7 @@ def intersect(rays, n, tree, table, first, opacity):
                                 while late:
                                     settle(rays, i + lowest(late), first + q, table, q, opacity)
                                     late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 

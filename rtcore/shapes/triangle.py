@@ -222,7 +222,7 @@ def intersect(rays, n, tree, table, first, opacity):
         leaf = next_leaf(walk, tree, table)
         while leaf >= 0:
             ray = only_ray(walk)
-            seen = every if ray < 0 else 1 << int(slant[3, ray])
+            seen, touched = every if ray < 0 else 1 << int(slant[3, ray]), 0
             while seen:
                 axis = lowest_bit(seen)
                 seen &= seen - 1
@@ -238,6 +238,7 @@ def intersect(rays, n, tree, table, first, opacity):
                         if axes[g] != 1 << axis:
                             ok = ok & (load(slant, 3, g * 8) == axis)
                         if any_lane(ok):
+                            touched |= 1 << g
                             det, inverse = u + v + w, load(slant, 2, g * 8)
                             late = bits(ok & (size(det) < tiny))
                             if side & (FRONT | BACK):
@@ -249,7 +250,7 @@ def intersect(rays, n, tree, table, first, opacity):
                             while late:
                                 settle(rays, i + lowest(late), first + q, table, q, axis, opacity)
                                 late &= late - 1
-            shrink(walk, rays, start)
+            shrink(walk, rays, start, touched)
             leaf = next_leaf(walk, tree, table)
 
 
