@@ -31,8 +31,8 @@ TINY = 2.0 ** -60       # a direction's part that counts as 0
 
 #: state[MODE]: a pyramid around all rays, each ray on its own, those that meet a node together; or there is one leaf and nothing to walk.
 BEAM, SINGLY, SOME, ALONE = range(4)
-#: Of a beam that meets a node with no more rays than this, these are walked on as SOME: 8 % faster in the gallery's snail, 4 to 10 % in the
-#: pictures of balls, tree and mount, nothing in tetra; with 16 or 64 the same within 2 %.
+#: Of a beam that meets a node with no more rays than this, these are walked on as SOME: the gallery's snail, tree and mount take 6 to 9 %
+#: less, a flake of 66,430 spheres 2 %, balls and tetra as long as ever; with 16 or 64 it is the same within 2 %.
 FEW = 32
 APART = -2              # in place of a leaf: a beam has just come down to few rays
 SLOTS = 8               # rays walked in turns; a power of two
