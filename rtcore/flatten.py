@@ -157,13 +157,14 @@ def _gather(kind: Kind, key: tuple, packs: list[tuple[int, Packed]], leaves, dty
         low, high = kind.bounds(data.astype(seen).astype(np.float64), extra.astype(seen).astype(np.float64))
         tree, order = build(low, high, kind.leaf_most)
         has_tree = len(data) > kind.leaf_most
-        data, owner, side, exact = data[order], owner[order], side[order], exact[order]
-        if len(extra) and not kind.shared_extra:
-            extra = extra[order]
-    wanted = (data, dtype), (extra, np.float64 if kind.shared_extra else dtype), (side, np.int8), (exact, np.float64)
-    table = Table(*carved(*((a.shape, kept) for a, kept in wanted)))
-    for kept, (a, _) in zip(table, wanted):
-        kept[:] = a
+        owner = owner[order]
+    parts = (data, dtype), (extra, np.float64 if kind.shared_extra else dtype), (side, np.int8), (exact, np.float64)
+    table = Table(*carved(*((part.shape, wanted) for part, wanted in parts)))
+    for to, (part, wanted) in zip(table, parts):
+        if part is extra and (kind.shared_extra or not len(extra)):
+            to[:] = part
+        else:       # straight to its place: a million triangles twice would be a hundred MiB more
+            np.take(part.astype(wanted, copy=False), order, axis=0, out=to, mode="clip")
     kept = {index: p for index, p in packs if len(p.data) <= FEW} if len(packs) <= MANY else {}
     return Group(kind, tree, table, 0, has_tree, key, owner, order, kept, sum(p.dropped for _, p in packs))
 
