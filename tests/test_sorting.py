@@ -13,9 +13,8 @@ from rtcore.plan import plan
 from rtcore.progressive import Renderer, RenderRequest
 from rtcore.settings import Settings
 from rtcore.sorting import WORTH, sort_rays, tell_hits
+from rtcore.walk import PACKET
 from rtcore.wave import DEAD, DX, OX, START, T, new_wave, padded
-
-PACKET = 64
 
 
 def bounced(o, d, dtype, known=()):
